@@ -106,12 +106,14 @@ class DeepestLine {
 
  private:
   TANDEM_HD int follow_lines_through(const Vector3* points, int count, double reach, double& depth);
-  TANDEM_HD_SELDOM void look_around(const Vector3& middle, double reach);
+  TANDEM_HD void search_from_seeds(double enough);
+  TANDEM_HD_SELDOM bool goes_on_elsewhere() const;
+  TANDEM_HD_SELDOM bool look_around(const Vector3& middle, double reach);
   TANDEM_HD void begin_half_spaces(const Vector3& middle, double reach);
   TANDEM_HD void learn(int side, const Crossing& surface, HalfSpace& out) const;
   /// Forgets half-spaces beyond which the bodies go on, up to these heights on a line.
   TANDEM_HD void go_beyond(const Vector2& at, const double (&height)[2]) {
-    shared_.spaces.drop_before(team_, at, height, 16 * bodies_.tolerance());
+    not_convex_ = shared_.spaces.drop_before(team_, at, height, 16 * bodies_.tolerance()) || not_convex_;
   }
   TANDEM_HD void propose(int seed);
   TANDEM_HD void ask_along(const Vector2& at, const double (&from)[2], const double (&limit)[2],
@@ -127,6 +129,7 @@ class DeepestLine {
   static constexpr int kLines = 4;  ///< of a step: along the proposed line, and straight to its ends
 
   bool one_region_;
+  bool not_convex_ = false;  ///< a body goes on beyond a half-space
   std::uint32_t begin_, end_;
   SearchMemory& shared_;
 };
@@ -211,10 +214,26 @@ TANDEM_HD void DeepestLine<Team>::begin_with_seeds(const PatchFrame& frame, doub
   team_.sync();
 }
 
-/// Follows the lines through more points of the overlap: those between the outermost places of the curve and
-/// what is opposite within both bodies. If one is deeper than the seeds', its point becomes a seed.
+/// Returns whether some corners show that a body goes on beyond its half-spaces, and so is not convex.
 template <typename Team>
-TANDEM_HD_SELDOM void DeepestLine<Team>::look_around(const Vector3& middle, double reach) {
+TANDEM_HD_SELDOM bool DeepestLine<Team>::goes_on_elsewhere() const {
+  constexpr std::uint32_t kCorners = 32;  // of each body
+  bool goes_on = false;
+  for (std::uint32_t i = team_.rank(); i < 2 * kCorners; i += team_.size()) {
+    const int side = static_cast<int>(i % 2);
+    const Shape& shape = *bodies_[side].shape;
+    const auto triangle = static_cast<std::uint32_t>(std::uint64_t{i / 2} * shape.triangle_count / kCorners);
+    const Vector3 x = bodies_[side].corner(triangle, 0);
+    goes_on = goes_on || shared_.spaces.any_before(side, shared_.frame.flat(x), shared_.frame.height(x),
+                                                   kNearEnd * shape.diagonal);
+  }
+  return team_.any(goes_on);
+}
+
+/// Follows the lines through more points of the overlap: those between the outermost places of the curve and
+/// what is opposite within both bodies. True if one is deeper than the best line: its point becomes a seed.
+template <typename Team>
+TANDEM_HD_SELDOM bool DeepestLine<Team>::look_around(const Vector3& middle, double reach) {
   constexpr int kPlaces = LineMemory::kMost / 2, kPoints = 4;
   const OverlapLines<Team> lines(team_, bodies_, memory_, shared_.lines);
   const Vector3 n = shared_.frame.n;
@@ -256,6 +275,7 @@ TANDEM_HD_SELDOM void DeepestLine<Team>::look_around(const Vector3& middle, doub
     seeds.at[at] = deepest, seeds.beside[at] = place[best].piece;
   }
   team_.sync();
+  return best >= 0;
 }
 
 /// Finds the half-space of a triangle that a line met; none if there is no triangle.
@@ -451,17 +471,10 @@ TANDEM_HD void DeepestLine<Team>::go_to_ends() {
   team_.sync();
 }
 
+/// Improves the best of the lines through the seeds.
 template <typename Team>
-TANDEM_HD void DeepestLine<Team>::find(const PatchFrame& frame, const Vector3& middle, double reach,
-                                       double enough, bool looks_around) {
-  begin_with_seeds(frame, reach);
-  if (looks_around && shared_.best.found() && shared_.best.depth > kNotFlat * reach) {
-    look_around(middle, reach);
-    begin_with_seeds(frame, reach);
-  }
+TANDEM_HD void DeepestLine<Team>::search_from_seeds(double enough) {
   const OverlapLine& best = shared_.best;
-  if (!best.found() || best.depth >= enough) return;
-  begin_half_spaces(middle, reach);
   const int deepest = shared_.from;
   for (int i = 0; i < shared_.seeds.count; ++i) {
     const int seed = i == 0 ? deepest : i <= deepest ? i - 1 : i;
@@ -474,6 +487,20 @@ TANDEM_HD void DeepestLine<Team>::find(const PatchFrame& frame, const Vector3& m
     while (shared_.proposed.found && shared_.steps < kMostSteps && best.depth < enough && step(seed))
       propose(seed);
   }
+}
+
+template <typename Team>
+TANDEM_HD void DeepestLine<Team>::find(const PatchFrame& frame, const Vector3& middle, double reach,
+                                       double enough, bool looks_around) {
+  begin_with_seeds(frame, reach);
+  if (!shared_.best.found() || shared_.best.depth >= enough) return;
+  begin_half_spaces(middle, reach);
+  if (looks_around && shared_.best.depth > kNotFlat * reach && (not_convex_ || goes_on_elsewhere()) &&
+      look_around(middle, reach)) {
+    begin_with_seeds(frame, reach);
+    begin_half_spaces(middle, reach);
+  }
+  search_from_seeds(enough);
   go_to_ends();
 }
 

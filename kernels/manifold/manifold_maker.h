@@ -167,7 +167,8 @@ TANDEM_HD_SELDOM void ManifoldMaker<Team>::begin_deep(std::uint32_t region, Norm
   DeepestLine<Team>(team_, bodies_, memory_, summary_, region, depths)
       .find_seeds(measure.middle, reach, kMostSeeds);
   if (team_.rank() == 0) {
-    patch.measure = measure, patch.reach = reach, patch.directions = 2 * lines;
+    patch.measure = measure, patch.reach = reach, patch.both_ways = shared.both_ways;
+    patch.directions = patch.both_ways ? 2 * lines : lines;
     for (int i = 0; i < lines; ++i) patch.tried[i] = shared.tried[i];
     for (double& depth : patch.depth) depth = INFINITY;
     patch.seeds = depths.seeds;
@@ -217,6 +218,7 @@ TANDEM_HD_SELDOM void ManifoldMaker<Team>::make_deep(std::uint32_t region, Outli
     for (int i = 0; i < patch.directions; ++i) {
       if (known[i] >= 0 && (next < 0 || known[i] < known[next])) next = i;
     }
+    if (known[next] >= enough) break;  // nor is any of the others shallower
     known[next] = -1;
     const double depth = depth_along(region, patch, next, depths, enough);
     if (depth < enough) patch.depth[next] = depth;

@@ -80,7 +80,8 @@ struct Direction {
 struct NormalMemory {
   Direction direction[kMostTried];  ///< of faces of a, then of b
   Vector3 tried[kMostTried];
-  int count;  ///< of those tried, where that is not known to all
+  int count;       ///< of those tried, where that is not known to all
+  bool both_ways;  ///< of a deep patch: they are tried the other way as well
   Spread spread[kMostTried];
 };
 
@@ -208,13 +209,16 @@ struct PatchState {
 struct DeepPatch {
   CurveMeasure measure;
   double reach;    ///< of the pieces, from their middle
-  int directions;  ///< along each line that is tried, both ways
+  int directions;
+  bool both_ways;  ///< along each line that is tried
   Vector3 tried[kMostTried];
   double depth[2 * kMostTried];  ///< along each direction; infinity where there is none
   Seeds seeds;
 
-  /// A direction that is tried: each line one way and the other.
-  TANDEM_HD Vector3 along(int i) const { return i % 2 == 0 ? tried[i / 2] : -tried[i / 2]; }
+  TANDEM_HD Vector3 along(int i) const {
+    if (!both_ways) return tried[i];
+    return i % 2 == 0 ? tried[i / 2] : -tried[i / 2];
+  }
 };
 
 /// The memory that a team shares while it finds a patch's normal and rim.

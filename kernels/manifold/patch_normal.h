@@ -25,6 +25,9 @@ inline constexpr float kSameLine = 1 - 1e-6f;
 /// A smooth patch lies on a face if this part of its curve lies in the face's plane.
 inline constexpr double kBearing = 0.9;
 
+/// A patch pushes along the normal of a face only if the cosine of its angle to the area vector is this at least.
+inline constexpr double kLeastAlong = 0.1;
+
 /// Faces of two bodies are flush, as seen from a to b, where the cosine of their normals is below this.
 inline constexpr double kFlush = -0.9995;
 
@@ -47,9 +50,9 @@ class NormalFinder {
   /// Condition: measure(), whose result this is.
   TANDEM_HD PatchNormal find(const CurveMeasure& curve);
 
-  /// Gathers in NormalMemory::tried the lines along which a deep patch may push, one way or the other: that
-  /// of the area vector, or of the triangles of sheets, and normals of faces of both bodies. Result: how
-  /// many.
+  /// Gathers in NormalMemory::tried the directions along which a deep patch may push: that of the area vector,
+  /// or of the triangles of sheets, and normals of faces of both bodies. Result: how many. Where the area says
+  /// which way a patch pushes, they point that way; else NormalMemory::both_ways is true.
   TANDEM_HD_SELDOM int gather_for_deep(const CurveMeasure& curve);
 
   /// Returns the distance of the piece's end that is furthest from a point.
@@ -75,7 +78,7 @@ class NormalFinder {
   TANDEM_HD LeastPiece least_unmarked(int side, const FloatVector& known) const;
   TANDEM_HD bool gather_directions(int side, bool keep_if_many);
   TANDEM_HD_SELDOM Vector3 longest_line(const Vector3& middle) const;
-  TANDEM_HD_SELDOM void gather_unlike(int side, const Vector3& line);
+  TANDEM_HD_SELDOM void gather_unlike(int side, const Vector3& line, const Vector3& push);
   TANDEM_HD void find_faces_along(const Vector3& smooth, std::uint32_t (&holder)[2]) const;
   TANDEM_HD void sum_lengths_on_faces(const FloatVector (&face)[2], const std::uint32_t (&holder)[2],
                                       ExactSum (&within)[2]) const;
@@ -407,7 +410,7 @@ TANDEM_HD Vector3 NormalFinder<Team>::face_nearest(const Vector3& smooth, double
   add(smooth);
   for (int i = 0; i < directions_; ++i) {
     const Vector3 n = shared_.direction[i].n;
-    if (dot(n, smooth) >= 0.1) add(n);
+    if (dot(n, smooth) >= kLeastAlong) add(n);
   }
   if (count == 1) return smooth;
   several_faces_ = of_a != kMost && of_b != kMost;
@@ -539,10 +542,13 @@ TANDEM_HD_SELDOM int NormalFinder<Team>::find_for_touch(Vector3& n) {
 }
 
 /// Adds the directions of faces of one body that differ most from each other and from a line, whichever way
-/// they point; of those that differ as much, that of the least triangles comes first. How long their pieces
+/// they point, of those that push along a unit vector, or of all where that is 0; of those that differ as much, that of the least triangles comes first. How long their pieces
 /// are does not matter: that depends on how faces are cut into triangles.
 template <typename Team>
-TANDEM_HD_SELDOM void NormalFinder<Team>::gather_unlike(int side, const Vector3& line) {
+TANDEM_HD_SELDOM void NormalFinder<Team>::gather_unlike(int side, const Vector3& line,
+                                                      const Vector3& push) {
+  const FloatVector towards = rounded(push);
+  const auto least_along = static_cast<float>(kLeastAlong * dot(push, push));
   FloatVector known[kMostDirections + 1] = {rounded(line)};
   int count = 0;
   for (; count < kMostDirections; ++count) {
@@ -552,7 +558,7 @@ TANDEM_HD_SELDOM void NormalFinder<Team>::gather_unlike(int side, const Vector3&
       const std::uint32_t at = memory_.order[i];
       const float* n = memory_.normals + 6 * std::size_t{at} + 3 * side;
       const FloatVector normal = {{n[0], n[1], n[2]}};
-      bool is_new = true;
+      bool is_new = dot(turned_normal(memory_.normals + 6 * std::size_t{at}, side), towards) >= least_along;
       float alike = 0;
       for (int k = 0; k <= count; ++k) {
         const float along = std::fabs(dot(normal, known[k]));
@@ -580,13 +586,15 @@ TANDEM_HD_SELDOM void NormalFinder<Team>::gather_unlike(int side, const Vector3&
 template <typename Team>
 TANDEM_HD_SELDOM int NormalFinder<Team>::gather_for_deep(const CurveMeasure& curve) {
   directions_ = 0;
-  const Vector3 line = longest_line(curve.middle);
-  gather_unlike(0, line);
-  gather_unlike(1, line);
   const Vector3 own = curve.by_area ? curve.area : curve.sheet_normal;
   const double size = norm(own);
   // Areas of two curves that cancel leave rounding.
   const bool counts = size > kLeastArea * curve.length * (curve.by_area ? curve.length : 1.0);
+  const bool joined = memory_.pieces[memory_.order[begin_]].joined != 0;
+  const bool both_ways = joined || summary_.degenerate || !counts || !curve.by_area;
+  const Vector3 line = longest_line(curve.middle), push = both_ways ? Vector3{} : (1 / size) * own;
+  gather_unlike(0, line, push);
+  gather_unlike(1, line, push);
   int count = 0;
   const auto add = [&](const Vector3& n) {
     bool is_new = true;
@@ -598,6 +606,7 @@ TANDEM_HD_SELDOM int NormalFinder<Team>::gather_for_deep(const CurveMeasure& cur
     if (counts) add((1 / size) * own);
     for (int i = 0; i < directions_; ++i) add(shared_.direction[i].n);
     shared_.count = count;
+    shared_.both_ways = both_ways;
   }
   team_.sync();
   return shared_.count;

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <map>
 
 #include "manifold_scene.h"
 #include "overlap_oracle.h"
@@ -36,10 +37,19 @@ const std::vector<Body>& bodies() {
   return all;
 }
 
+/// Equal points become one.
 OracleSolid solid_of(const Mesh& mesh, const Pose& pose) {
   OracleSolid out;
-  for (const auto& p : mesh.points) out.points.push_back(apply(pose, Vector3{p[0], p[1], p[2]}));
-  out.triangles = mesh.triangles;
+  std::map<std::array<float, 3>, std::uint32_t> known;
+  for (const auto& triangle : mesh.triangles) {
+    auto& corners = out.triangles.emplace_back();
+    for (std::size_t k = 0; k < 3; ++k) {
+      const auto& p = mesh.points[triangle[k]];
+      const auto [at, is_new] = known.emplace(p, static_cast<std::uint32_t>(out.points.size()));
+      if (is_new) out.points.push_back(apply(pose, Vector3{p[0], p[1], p[2]}));
+      corners[k] = at->second;
+    }
+  }
   return out;
 }
 
@@ -82,78 +92,108 @@ double longest_stretch(const OverlapPiece& piece, const Vector3& n) {
   return longest;
 }
 
-/// What was found about the pieces of some overlaps.
+/// What was found about the pieces of overlaps.
 struct Findings {
-  int scenes = 0, pieces = 0, missed = 0, several = 0, strays = 0, manifolds = 0, other_area = 0, grows = 0,
-      too_shallow = 0, undecided = 0;
-  double least_part = 1;
-
-  void print(const char* a, const char* b) const {
-    std::printf("%s, %s: %d scenes, %d pieces of overlap, %d without a manifold, %d with several; %d manifolds, "
-                "%d in no piece; %d pieces of another area, %d not shrunk (%d balanced); %d too shallow, least part %.3f\n",
-                a, b, scenes, pieces, missed, several, manifolds, strays, other_area, grows, undecided, too_shallow,
-                least_part);
-  }
+  int pieces = 0, missed = 0, several = 0, other_area = 0;
+  int manifolds = 0, beside = 0;       ///< no point of one lies in a piece
+  int one = 0, shrinks = 0, ends = 0;  ///< of pieces with one manifold, those that its normal shrinks at once, or
+                                       ///< once b has moved by the depth
+  int shallow = 0, half = 0;           ///< depths below 0.99 and 0.5 of the longest stretch along the normal
 };
 
-class Overlaps : public testing::TestWithParam<Body> {};
+class Overlaps : public testing::TestWithParam<Body> {
+ protected:
+  static void look_at(const ManifoldScene& scene, double size, Findings& found);
+
+ private:
+  static OracleSolid solid(const ManifoldScene& scene, std::uint32_t body, const Vector3& way = {}) {
+    Pose pose = scene.posed[body].pose;
+    pose.translation[0] += way.x, pose.translation[1] += way.y, pose.translation[2] += way.z;
+    return solid_of(scene.assets.mesh(body), pose);
+  }
+  static void look_at_one(const ManifoldScene& scene, const OverlapPiece& piece, const Manifold& m,
+                          bool is_only_piece, Findings& found);
+};
+
+/// The manifold is the only one of the piece.
+void Overlaps::look_at_one(const ManifoldScene& scene, const OverlapPiece& piece, const Manifold& m,
+                           bool is_only_piece, Findings& found) {
+  const Vector3 n = vector_of(m.normal);
+  const double stretch = longest_stretch(piece, n);
+  found.shallow += m.depth < 0.99 * stretch;
+  found.half += m.depth < 0.5 * stretch;
+  const bool shrinks = dot(n, piece.area) > 0;
+  if (!shrinks && !is_only_piece) return;
+  ++found.one;
+  found.shrinks += shrinks;
+  if (shrinks) return;
+  double left = 0;
+  for (const OverlapPiece& part : overlap_of(solid(scene, 0), solid(scene, 1, (1.001 * m.depth) * n)))
+    left += part.volume;
+  found.ends += left < piece.volume;
+}
+
+void Overlaps::look_at(const ManifoldScene& scene, double size, Findings& found) {
+  const auto pieces = overlap_of(solid(scene, 0), solid(scene, 1));
+  std::vector<std::vector<const Manifold*>> of_piece(pieces.size());
+  for (const Manifold& m : scene.manifolds()) {
+    ++found.manifolds;
+    double least = INFINITY;
+    std::size_t nearest = 0;
+    for (std::size_t i = 0; i < pieces.size() && least > 0; ++i) {
+      for (const ManifoldPoint& p : scene.points_of(m)) {
+        const double distance = distance_from(pieces[i], vector_of(p.position));
+        if (distance < least) least = distance, nearest = i;
+      }
+    }
+    found.beside += least > 1e-6 * size;
+    if (least < INFINITY) of_piece[nearest].push_back(&m);
+  }
+  for (std::size_t i = 0; i < pieces.size(); ++i) {
+    const double whole = std::min(pieces[i].whole_area_a, pieces[i].whole_area_b);
+    if (whole == 0) continue;  // one body lies in the other
+    ++found.pieces;
+    found.missed += of_piece[i].empty();
+    found.several += of_piece[i].size() > 1;
+    Vector3 area;
+    for (const Manifold* m : of_piece[i]) area = area + vector_of(m->area_vector);
+    found.other_area += norm(area - pieces[i].area) > 1e-6 * whole;
+    if (of_piece[i].size() == 1) look_at_one(scene, pieces[i], *of_piece[i][0], pieces.size() == 1, found);
+  }
+}
 
 TEST_P(Overlaps, HaveAManifoldInEachPieceThatShrinksIt) {
   RandomPoses random(23);
   ASSERT_TRUE(bounds_a_solid(solid_of(GetParam().mesh, kIdentityPose)));
+  Findings found;
   for (const Body& other : bodies()) {
     ManifoldScene scene;
     scene.add_body(scene.add_shape(GetParam().mesh), kIdentityPose);
     scene.add_body(scene.add_shape(other.mesh), kIdentityPose);
-    const double size = std::min(radius_of(scene.assets.views()[0]), radius_of(scene.assets.views()[1]));
-    Findings found;
-    for (int trial = 0; trial < trials(10, 100); ++trial) {
+    const AssetView a = scene.assets.views()[0], b = scene.assets.views()[1];
+    const double both = radius_of(a) + radius_of(b), size = std::min(radius_of(a), radius_of(b));
+    for (int trial = 0; trial < trials(10, 30); ++trial) {
       SCOPED_TRACE(std::string(other.name) + " " + std::to_string(trial));
-      scene.bodies[0].pose = any_motion(random, 0);
-      scene.bodies[1].pose = any_motion(random, std::pow(10, random.uniform(-1, 0.1)));
+      const Vector3 way = rotate(any_motion(random, 0), {0, 0, both * std::pow(10, random.uniform(-1, -0.15))});
+      scene.bodies[0].pose = centred_at(a, any_motion(random, 0), {0, 0, 0});
+      scene.bodies[1].pose = centred_at(b, any_motion(random, 0), {way.x, way.y, way.z});
       scene.find();
-      if (scene.query.rows().empty()) continue;
-      ++found.scenes;
-      const auto pieces = overlap_of(solid_of(GetParam().mesh, scene.bodies[0].pose),
-                                     solid_of(other.mesh, scene.bodies[1].pose));
-      std::vector<std::vector<const Manifold*>> of_piece(pieces.size());
-      for (const Manifold& m : scene.manifolds()) {
-        ++found.manifolds;
-        double least = INFINITY;
-        std::size_t nearest = 0;
-        for (std::size_t i = 0; i < pieces.size(); ++i) {
-          for (const ManifoldPoint& p : scene.points_of(m)) {
-            const double distance = distance_from(pieces[i], vector_of(p.position));
-            if (distance < least) least = distance, nearest = i;
-          }
-        }
-        if (least > 1e-6 * size) ++found.strays;
-        if (least < INFINITY) of_piece[nearest].push_back(&m);
-      }
-      for (std::size_t i = 0; i < pieces.size(); ++i) {
-        const OverlapPiece& piece = pieces[i];
-        if (piece.whole_area_a == 0 || piece.whole_area_b == 0) continue;  // one within the other
-        ++found.pieces;
-        found.missed += of_piece[i].empty();
-        found.several += of_piece[i].size() > 1;
-        Vector3 area;
-        bool shrinks = false;
-        for (const Manifold* m : of_piece[i]) {
-          area = area + vector_of(m->area_vector);
-          shrinks = shrinks || dot(vector_of(m->normal), piece.area) > 0;
-          const double stretch = longest_stretch(piece, vector_of(m->normal));
-          found.too_shallow += m->depth < 0.99 * stretch;
-          found.least_part = std::min(found.least_part, m->depth / stretch);
-        }
-        const bool balanced = norm(piece.area) < 0.1 * std::min(piece.whole_area_a, piece.whole_area_b);
-        found.undecided += balanced;
-        found.grows += !shrinks && !of_piece[i].empty();
-        if (norm(area - piece.area) > 1e-6 * std::min(piece.whole_area_a, piece.whole_area_b)) ++found.other_area;
-        if (std::getenv("VERBOSE") && of_piece[i].empty()) std::printf("  MISS trial %d volume %g areas %g %g manifolds %zu\n", trial, piece.volume, piece.whole_area_a, piece.whole_area_b, scene.manifolds().size());
-      }
+      if (!scene.query.rows().empty()) look_at(scene, size, found);
     }
-    found.print(GetParam().name, other.name);
   }
+  std::printf("%s: %d pieces, %d without a manifold, %d with several, %d of another area; %d of %d manifolds lie "
+              "beside; of %d pieces with one, its normal shrinks %d at once and %d in the end; %d of the depths are "
+              "below 0.99 of the longest stretch, %d below half\n",
+              GetParam().name, found.pieces, found.missed, found.several, found.other_area, found.beside,
+              found.manifolds, found.one, found.shrinks, found.ends, found.shallow, found.half);
+  EXPECT_GT(found.pieces, 50);
+  EXPECT_LE(found.missed, found.pieces / 1000);
+  EXPECT_LE(found.several, found.pieces / 6);
+  EXPECT_LE(found.other_area, found.pieces / 100);
+  EXPECT_LE(found.beside, found.manifolds / 40);
+  EXPECT_GE(found.shrinks + found.ends, found.one - 1 - found.one / 100);
+  EXPECT_LE(found.shallow, found.one / 10);
+  EXPECT_LE(found.half, 1 + found.one / 30);
 }
 
 INSTANTIATE_TEST_SUITE_P(Bodies, Overlaps, testing::ValuesIn(bodies()),

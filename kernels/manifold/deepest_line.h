@@ -178,8 +178,8 @@ TANDEM_HD int DeepestLine<Team>::follow_lines_through(const Vector3* points, int
     const int side = i % 2;
     const double from = shared_.frame.height(point);
     questions.ask(static_cast<std::uint32_t>(i), shared_.frame, side, side == 0 ? 1 : -1,
-                  shared_.frame.flat(point), from, side == 0 ? from : -INFINITY,
-                  side == 0 ? INFINITY : from, reach, kGrazes);
+                  shared_.frame.flat(point), from, side == 0 ? from : -INFINITY, side == 0 ? INFINITY : from,
+                  reach, kGrazes);
   }
   team_.sync();
   if (count > 0) walk_lines(team_, questions, 2 * static_cast<std::uint32_t>(count), line);
@@ -204,10 +204,8 @@ TANDEM_HD void DeepestLine<Team>::begin_with_seeds(const PatchFrame& frame, doub
     shared_.best = {};
     if (from >= 0) {
       const LineQuestion &top = shared_.lines.line[2 * from], &bottom = shared_.lines.line[2 * from + 1];
-      shared_.best = {depth,
-                      {top.best.triangle, bottom.best.triangle},
-                      top.at,
-                      {top.best.height, bottom.best.height}};
+      shared_.best = {
+          depth, {top.best.triangle, bottom.best.triangle}, top.at, {top.best.height, bottom.best.height}};
       shared_.from = from;
     }
   }
@@ -241,9 +239,10 @@ TANDEM_HD_SELDOM bool DeepestLine<Team>::look_around(const Vector3& middle, doub
     return lines.furthest_place(begin_, end_, reach,
                                 [&](const Vector3& x) { return dot(x - middle, direction); });
   };
-  Vector3 along = lines.furthest_place(begin_, end_, reach, [&](const Vector3& x) {
-                         return dot(x - middle, x - middle);
-                       }).at - middle;
+  Vector3 along =
+      lines.furthest_place(begin_, end_, reach, [&](const Vector3& x) { return dot(x - middle, x - middle); })
+          .at -
+      middle;
   along = along - dot(along, n) * n;
   const Vector3 across = cross(n, along);
   Place place[kPlaces];
@@ -271,7 +270,9 @@ TANDEM_HD_SELDOM bool DeepestLine<Team>::look_around(const Vector3& middle, doub
   team_.sync();  // all have read the best line
   if (team_.rank() == 0 && best >= 0) {
     Seeds& seeds = shared_.seeds;
-    const int last = kMostSeeds - 1, at = seeds.count <= last ? seeds.count++ : shared_.from == last ? last - 1 : last;
+    const int last = kMostSeeds - 1, at = seeds.count <= last    ? seeds.count++
+                                          : shared_.from == last ? last - 1
+                                                                 : last;
     seeds.at[at] = deepest, seeds.beside[at] = place[best].piece;
   }
   team_.sync();

@@ -8,12 +8,13 @@ namespace tandem::manifold {
 /// float32 corners are not quite flat.
 inline constexpr double kNearEnd = 1e-6;
 
-/// A place on a curve that is chosen for where it is lies at least this part of the curve's reach beside the ends
-/// of its piece, if the piece is long enough: at an end both triangles of an edge have it, and rounding decides.
+/// A place on a curve that is chosen for where it is lies at least this part of the curve's reach beside the
+/// ends of its piece, if the piece is long enough: at an end both triangles of an edge have it, and rounding
+/// decides.
 inline constexpr double kOffEnd = 0x1p-10;
 
-/// A place on a curve. It is found by its coordinates, not by numbers of triangles, so it hardly depends on how
-/// the surfaces are cut into triangles.
+/// A place on a curve. It is found by its coordinates, not by numbers of triangles, so it hardly depends on
+/// how the surfaces are cut into triangles.
 struct Place {
   Vector3 at;
   std::uint32_t piece;
@@ -65,8 +66,8 @@ class OverlapLines {
   /// there, behind both triangles, to where the overlap ends on that line, but no further
   /// than `most`. expected: how far that is, mostly. Result: a bit for each place; 0 where its triangles face
   /// each other, or the line is not within both bodies.
-  TANDEM_HD_SELDOM std::uint32_t go_inside(const Place* place, int count, double most,
-                                           double expected, Vector3* inside) const;
+  TANDEM_HD_SELDOM std::uint32_t go_inside(const Place* place, int count, double most, double expected,
+                                           Vector3* inside) const;
 
   /// Asks where a straight line within a, and one within b, from one point to two others meet the surface of
   /// the body, if they do so before they are there. first: the first of the two questions.
@@ -125,9 +126,8 @@ TANDEM_HD Place OverlapLines<Team>::least_place(std::uint32_t begin, std::uint32
 }
 
 template <typename Team>
-TANDEM_HD_SELDOM std::uint32_t OverlapLines<Team>::go_inside(const Place* place, int count,
-                                                             double most, double expected,
-                                                             Vector3* inside) const {
+TANDEM_HD_SELDOM std::uint32_t OverlapLines<Team>::go_inside(const Place* place, int count, double most,
+                                                             double expected, Vector3* inside) const {
   LineQuestions questions(bodies_, shared_.line);
   team_.sync();
   for (int i = static_cast<int>(team_.rank()); i < count; i += static_cast<int>(team_.size())) {

@@ -208,7 +208,7 @@ struct PatchState {
 /// A patch whose overlap is to be measured along many directions.
 struct DeepPatch {
   CurveMeasure measure;
-  double reach;    ///< of the pieces, from their middle
+  double reach;  ///< of the pieces, from their middle
   int directions;
   bool both_ways;  ///< along each line that is tried
   Vector3 tried[kMostTried];

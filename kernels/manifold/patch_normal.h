@@ -25,7 +25,8 @@ inline constexpr float kSameLine = 1 - 1e-6f;
 /// A smooth patch lies on a face if this part of its curve lies in the face's plane.
 inline constexpr double kBearing = 0.9;
 
-/// A patch pushes along the normal of a face only if the cosine of its angle to the area vector is this at least.
+/// A patch pushes along the normal of a face only if the cosine of its angle to the area vector is this at
+/// least.
 inline constexpr double kLeastAlong = 0.1;
 
 /// Faces of two bodies are flush, as seen from a to b, where the cosine of their normals is below this.
@@ -50,9 +51,9 @@ class NormalFinder {
   /// Condition: measure(), whose result this is.
   TANDEM_HD PatchNormal find(const CurveMeasure& curve);
 
-  /// Gathers in NormalMemory::tried the directions along which a deep patch may push: that of the area vector,
-  /// or of the triangles of sheets, and normals of faces of both bodies. Result: how many. Where the area says
-  /// which way a patch pushes, they point that way; else NormalMemory::both_ways is true.
+  /// Gathers in NormalMemory::tried the directions along which a deep patch may push: that of the area
+  /// vector, or of the triangles of sheets, and normals of faces of both bodies. Result: how many. Where the
+  /// area says which way a patch pushes, they point that way; else NormalMemory::both_ways is true.
   TANDEM_HD_SELDOM int gather_for_deep(const CurveMeasure& curve);
 
   /// Returns the distance of the piece's end that is furthest from a point.
@@ -542,11 +543,11 @@ TANDEM_HD_SELDOM int NormalFinder<Team>::find_for_touch(Vector3& n) {
 }
 
 /// Adds the directions of faces of one body that differ most from each other and from a line, whichever way
-/// they point, of those that push along a unit vector, or of all where that is 0; of those that differ as much, that of the least triangles comes first. How long their pieces
-/// are does not matter: that depends on how faces are cut into triangles.
+/// they point, of those that push along a unit vector, or of all where that is 0; of those that differ as
+/// much, that of the least triangles comes first. How long their pieces are does not matter: that depends on
+/// how faces are cut into triangles.
 template <typename Team>
-TANDEM_HD_SELDOM void NormalFinder<Team>::gather_unlike(int side, const Vector3& line,
-                                                      const Vector3& push) {
+TANDEM_HD_SELDOM void NormalFinder<Team>::gather_unlike(int side, const Vector3& line, const Vector3& push) {
   const FloatVector towards = rounded(push);
   const auto least_along = static_cast<float>(kLeastAlong * dot(push, push));
   FloatVector known[kMostDirections + 1] = {rounded(line)};

@@ -63,7 +63,8 @@ class RegionFinder {
   /// The place of a curve that is nearest to the middle of all.
   TANDEM_HD Place place_in(std::uint32_t curve) const {
     const std::uint32_t piece = piece_of(curve);
-    return {OverlapLines<Team>::nearest_on(memory_.pieces[piece], summary_.origin, kOffEnd * summary_.unit), piece};
+    return {OverlapLines<Team>::nearest_on(memory_.pieces[piece], summary_.origin, kOffEnd * summary_.unit),
+            piece};
   }
   TANDEM_HD bool comes_first(std::uint32_t i, std::uint32_t than) const;
   TANDEM_HD std::uint32_t neighbour(std::uint32_t of, int k) const;
@@ -174,8 +175,9 @@ TANDEM_HD std::uint32_t RegionFinder<Team>::sort_by_region() {
 template <typename Team>
 TANDEM_HD void RegionFinder<Team>::begin() {
   for (std::uint32_t c = 0; c < summary_.curves; ++c) {
-    const Place place = OverlapLines<Team>(team_, bodies_, memory_, shared_->lines)
-                            .nearest_place(memory_.start[c], memory_.start[c + 1], summary_.origin, summary_.unit);
+    const Place place =
+        OverlapLines<Team>(team_, bodies_, memory_, shared_->lines)
+            .nearest_place(memory_.start[c], memory_.start[c + 1], summary_.origin, summary_.unit);
     if (team_.rank() != 0) continue;
     piece_of(c) = place.piece;
     partners_of(c, 0) = partners_of(c, 1) = 0;

@@ -153,12 +153,8 @@ Mesh ring(int corners, double radius, int tube_corners, double tube_radius) {
 }
 
 Mesh cup(int sectors, float radius, float height, float wall) {
-  const std::array<float, 2> profile[] = {{0, 0},
-                                          {radius, 0},
-                                          {radius, height},
-                                          {radius - wall, height},
-                                          {radius - wall, wall},
-                                          {0, wall}};
+  const std::array<float, 2> profile[] = {
+      {0, 0}, {radius, 0}, {radius, height}, {radius - wall, height}, {radius - wall, wall}, {0, wall}};
   Mesh mesh;
   std::vector<std::vector<std::uint32_t>> ring;
   for (const auto& [from_axis, z] : profile) {

@@ -3,9 +3,9 @@
 #include <cstdio>
 #include <map>
 
+#include "kernels/manifold/surface_line.h"
 #include "manifold_scene.h"
 #include "overlap_oracle.h"
-#include "kernels/manifold/surface_line.h"
 
 /// Manifolds of bodies of any shape, beside the overlap as CGAL cuts it out.
 namespace tandem::test {
@@ -109,7 +109,8 @@ double longest_stretch(const OverlapPiece& piece, const Vector3& n) {
     }
     std::sort(heights.begin(), heights.end());
     if (heights.size() % 2 != 0) continue;  // the line goes through an edge
-    for (std::size_t k = 0; k < heights.size(); k += 2) longest = std::max(longest, heights[k + 1] - heights[k]);
+    for (std::size_t k = 0; k < heights.size(); k += 2)
+      longest = std::max(longest, heights[k + 1] - heights[k]);
   }
   return longest;
 }
@@ -118,9 +119,9 @@ double longest_stretch(const OverlapPiece& piece, const Vector3& n) {
 struct Findings {
   int pieces = 0, missed = 0, several = 0, other_area = 0;
   int manifolds = 0, beside = 0;       ///< no point of one lies in a piece
-  int one = 0, shrinks = 0, ends = 0;  ///< of pieces with one manifold, those that its normal shrinks at once, or
-                                       ///< once b has moved by the depth
-  int shallow = 0, half = 0;           ///< depths below 0.99 and 0.5 of the longest stretch along the normal
+  int one = 0, shrinks = 0, ends = 0;  ///< of pieces with one manifold, those that its normal shrinks at
+                                       ///< once, or once b has moved by the depth
+  int shallow = 0, half = 0;  ///< depths below 0.99 and 0.5 of the longest stretch along the normal
 };
 
 class Overlaps : public testing::TestWithParam<Body> {
@@ -161,7 +162,9 @@ void Overlaps::look_at(const ManifoldScene& scene, double size, Findings& found)
   for (const Manifold& m : scene.manifolds()) {
     ++found.manifolds;
     const std::size_t own = piece_of(m, scene.points_of(m), pieces);
-    const auto in_it = [&](const ManifoldPoint& p) { return distance_from(pieces[own], vector_of(p.position)) < 1e-6 * size; };
+    const auto in_it = [&](const ManifoldPoint& p) {
+      return distance_from(pieces[own], vector_of(p.position)) < 1e-6 * size;
+    };
     found.beside += std::none_of(scene.points_of(m).begin(), scene.points_of(m).end(), in_it);
     of_piece[own].push_back(&m);
   }
@@ -190,18 +193,20 @@ TEST_P(Overlaps, HaveAManifoldInEachPieceThatShrinksIt) {
     const double both = radius_of(a) + radius_of(b), size = std::min(radius_of(a), radius_of(b));
     for (int trial = 0; trial < trials(10, 30); ++trial) {
       SCOPED_TRACE(std::string(other.name) + " " + std::to_string(trial));
-      const Vector3 way = rotate(any_motion(random, 0), {0, 0, both * std::pow(10, random.uniform(-1, -0.15))});
+      const Vector3 way =
+          rotate(any_motion(random, 0), {0, 0, both * std::pow(10, random.uniform(-1, -0.15))});
       scene.bodies[0].pose = centred_at(a, any_motion(random, 0), {0, 0, 0});
       scene.bodies[1].pose = centred_at(b, any_motion(random, 0), {way.x, way.y, way.z});
       scene.find();
       if (!scene.query.rows().empty()) look_at(scene, size, found);
     }
   }
-  std::printf("%s: %d pieces, %d without a manifold, %d with several, %d of another area; %d of %d manifolds lie "
-              "beside; of %d pieces with one, its normal shrinks %d at once and %d in the end; %d of the depths are "
-              "below 0.99 of the longest stretch, %d below half\n",
-              GetParam().name, found.pieces, found.missed, found.several, found.other_area, found.beside,
-              found.manifolds, found.one, found.shrinks, found.ends, found.shallow, found.half);
+  std::printf(
+      "%s: %d pieces, %d without a manifold, %d with several, %d of another area; %d of %d manifolds lie "
+      "beside; of %d pieces with one, its normal shrinks %d at once and %d in the end; %d of the depths are "
+      "below 0.99 of the longest stretch, %d below half\n",
+      GetParam().name, found.pieces, found.missed, found.several, found.other_area, found.beside,
+      found.manifolds, found.one, found.shrinks, found.ends, found.shallow, found.half);
   EXPECT_GT(found.pieces, 50);
   EXPECT_LE(found.missed, found.pieces / 1000);
   EXPECT_LE(found.several, found.pieces / 6);

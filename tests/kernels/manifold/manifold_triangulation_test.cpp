@@ -12,13 +12,15 @@ namespace {
 
 constexpr double kDegree = 3.14159265358979323846 / 180;
 
-/// Splits each triangle into four at the middles of its edges. The surface stays where it is, but for float32.
+/// Splits each triangle into four at the middles of its edges. The surface stays where it is, but for
+/// float32.
 Mesh subdivided(const Mesh& mesh) {
   Mesh out;
   out.points = mesh.points;
   std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t> middles;
   const auto middle = [&](std::uint32_t i, std::uint32_t j) {
-    const auto [at, is_new] = middles.emplace(std::minmax(i, j), static_cast<std::uint32_t>(out.points.size()));
+    const auto [at, is_new] =
+        middles.emplace(std::minmax(i, j), static_cast<std::uint32_t>(out.points.size()));
     if (is_new) {
       const auto &p = mesh.points[i], &q = mesh.points[j];
       out.points.push_back({(p[0] + q[0]) / 2, (p[1] + q[1]) / 2, (p[2] + q[2]) / 2});
@@ -80,11 +82,12 @@ Mesh grid_solid(const std::array<std::vector<float>, 3>& cuts, const IsFull& is_
 
 /// An angle bracket whose two plates have a hole each.
 Mesh bracket() {
-  return grid_solid({{{-0.5f, -0.375f, 0, 0.25f, 0.5f}, {-0.4f, -0.1f, 0.15f, 0.4f}, {-0.5f, -0.375f, 0, 0.25f, 0.5f}}},
-                    [](int x, int y, int z) {
-                      const bool hole = y == 1 && (x == 2 || z == 2);
-                      return (x == 0 || z == 0) && !hole;
-                    });
+  return grid_solid(
+      {{{-0.5f, -0.375f, 0, 0.25f, 0.5f}, {-0.4f, -0.1f, 0.15f, 0.4f}, {-0.5f, -0.375f, 0, 0.25f, 0.5f}}},
+      [](int x, int y, int z) {
+        const bool hole = y == 1 && (x == 2 || z == 2);
+        return (x == 0 || z == 0) && !hole;
+      });
 }
 
 struct Solid {
@@ -112,71 +115,81 @@ double angle_between(const Vector3& p, const Vector3& q) {
   return std::atan2(norm(cross(p, q)), dot(p, q));
 }
 
+/// How many manifolds of one triangulation differ from those of another one.
+struct Differences {
+  int scenes = 0, other_number = 0, manifolds = 0, other_depth = 0, other_normal = 0;
+
+  void take(std::span<const Manifold> x, std::span<const Manifold> y) {
+    ++scenes;
+    if (x.size() != y.size()) return ++other_number, void();
+    for (const Manifold& m : x) {
+      const auto off = [&](const Manifold& n) {
+        return norm(vector_of(m.area_vector) - vector_of(n.area_vector)) +
+               norm(vector_of(m.centre) - vector_of(n.centre));
+      };
+      const Manifold& n = *std::min_element(
+          y.begin(), y.end(), [&](const Manifold& p, const Manifold& q) { return off(p) < off(q); });
+      ++manifolds;
+      other_depth += std::fabs(m.depth - n.depth) > 0.01 * std::max(m.depth, n.depth) + 1e-6;
+      other_normal += angle_between(vector_of(m.normal), vector_of(n.normal)) > kDegree;
+    }
+  }
+};
+
 class Triangulations : public testing::TestWithParam<Solid> {};
 
 TEST_P(Triangulations, OfOneSolidGiveTheSameManifolds) {
   RandomPoses random(17);
-  const bool verbose = std::getenv("VERBOSE") != nullptr;
-  const char* only = std::getenv("ONLY");
+  Differences flat, deep;
   for (const Solid& other : solids()) {
-    if (only && std::string(only) != other.name) continue;
     Mesh a = GetParam().mesh, b = other.mesh;
     ManifoldScene coarse, fine;
     coarse.add_body(coarse.add_shape(a), kIdentityPose);
     coarse.add_body(coarse.add_shape(b), kIdentityPose);
-    const int times = a.triangles.size() > 1000 || b.triangles.size() > 1000 ? 1 : 2;
+    const int times = a.triangles.size() + b.triangles.size() > 1000 ? 1 : 2;
     for (int i = 0; i < times; ++i) a = subdivided(a), b = subdivided(b);
     fine.add_body(fine.add_shape(a), kIdentityPose);
     fine.add_body(fine.add_shape(b), kIdentityPose);
     coarse.find();
-    const AssetView va = coarse.assets.views()[0], vb = coarse.assets.views()[1];
-    const double size = std::min(radius_of(va), radius_of(vb)), both = radius_of(va) + radius_of(vb);
-    int seen = 0, scenes = 0, other_count = 0, other_depth = 0, other_normal = 0, both_wrong = 0;
+    const double radius_a = radius_of(coarse.assets.views()[0]),
+                 radius_b = radius_of(coarse.assets.views()[1]);
     for (int trial = 0; trial < trials(60, 20); ++trial) {
-      const Pose pose_a = any_motion(random, 0); Pose pose_b = any_motion(random, both * std::pow(10, random.uniform(-1, -0.2)));
-      if (std::getenv("SHALLOW")) {
-        const double far = both * 1.1; Vector3 d = rotate(pose_b, {0, 0, 1}); double lo = 0, hi = far;
-        const auto at = [&](double t) { Pose p = pose_b; p.translation[0] = pose_b.translation[0] * 0 + t * d.x, p.translation[1] = t * d.y, p.translation[2] = t * d.z; return p; };
-        for (int k = 0; k < 30; ++k) {
-          const double t = (lo + hi) / 2;
-          coarse.posed = {{0, pose_a}, {1, at(t)}};
-          EXPECT_EQ(coarse.scene.place(coarse.posed), Status::kOk);
-          EXPECT_EQ(coarse.query.find(coarse.scene, {.first_contact_only = true}), Status::kOk);
-          (coarse.query.rows().empty() ? hi : lo) = t;
+      coarse.bodies[0].pose = any_motion(random, 0);
+      Pose pose = any_motion(random, (radius_a + radius_b) * std::pow(10, random.uniform(-1, -0.2)));
+      if (trial % 2 == 0) {  // else they are deep in each other, mostly
+        const Vector3 way = rotate(pose, {0, 0, 1});
+        const auto at = [&](double part) {
+          return after(shift(part * way.x, part * way.y, part * way.z), pose);
+        };
+        double apart = 3 * (radius_a + radius_b), meeting = 0;
+        for (int i = 0; i < 30; ++i) {
+          coarse.bodies[1].pose = at((apart + meeting) / 2);
+          coarse.find();
+          (coarse.query.rows().empty() ? apart : meeting) = (apart + meeting) / 2;
         }
-        pose_b = at(lo - size * std::pow(10, random.uniform(-4, -1)));
+        pose = at(meeting - std::min(radius_a, radius_b) * std::pow(10, random.uniform(-4, -1)));
       }
-      coarse.bodies[0].pose = fine.bodies[0].pose = pose_a;
-      coarse.bodies[1].pose = fine.bodies[1].pose = pose_b;
+      coarse.bodies[1].pose = pose;
+      for (int i = 0; i < 2; ++i) fine.bodies[i].pose = coarse.bodies[i].pose;
       coarse.find(), fine.find();
-      if (coarse.manifolds().empty() && fine.manifolds().empty()) continue;
-      ++scenes;
-      if (coarse.manifolds().size() != fine.manifolds().size()) {
-        ++other_count;
-        if (verbose) { std::printf("  trial %d count %zu %zu\n", trial, coarse.manifolds().size(), fine.manifolds().size());
-        for (auto* s : {&coarse, &fine}) for (auto& m : s->manifolds()) std::printf("     depth %.6f n %.4f %.4f %.4f area %.5f  flags %u  c %.3f %.3f %.3f\n", m.depth, m.normal[0], m.normal[1], m.normal[2], norm(vector_of(m.area_vector)), m.flags, m.centre[0], m.centre[1], m.centre[2]);
-        }
-        continue;
-      }
-      for (const Manifold& m : coarse.manifolds()) {
-        const Manifold* best = nullptr;
-        double least = INFINITY;
-        for (const Manifold& n : fine.manifolds()) {
-          const double d = norm(vector_of(m.centre) - vector_of(n.centre)) / size + norm(vector_of(m.area_vector) - vector_of(n.area_vector)) / size / size;
-          if (d < least) least = d, best = &n;
-        }
-        ++seen;
-        const double angle = angle_between(vector_of(m.normal), vector_of(best->normal)) / kDegree;
-        const bool d = !(std::fabs(m.depth - best->depth) <= 0.01 * std::max(m.depth, best->depth) + 1e-6 * size), n = !(angle <= 1);
-        other_depth += d;
-        other_normal += n;
-        both_wrong += d && n;
-        if (verbose && (d || n)) std::printf("  trial %d depth %.6f %.6f angle %.2f flags %u %u area %.6f %.6f n %.4f %.4f %.4f  /  %.4f %.4f %.4f\n", trial, m.depth, best->depth, angle, m.flags, best->flags, norm(vector_of(m.area_vector)), norm(vector_of(best->area_vector)), m.normal[0], m.normal[1], m.normal[2], best->normal[0], best->normal[1], best->normal[2]);
-      }
+      if (!coarse.query.rows().empty())
+        (trial % 2 == 0 ? flat : deep).take(coarse.manifolds(), fine.manifolds());
     }
-    std::printf("%-12s %-12s scenes %3d other count %3d; manifolds  %3d other depth %3d other normal %3d both %3d\n", GetParam().name, other.name, scenes, other_count, seen, other_depth, other_normal, both_wrong);
-    std::fflush(stdout);
   }
+  for (const auto& [name, found] : {std::pair{"a little", flat}, {"deep", deep}}) {
+    std::printf(
+        "%s, %s in each other: %d of %d scenes have another number of manifolds, %d of %d manifolds another "
+        "depth, %d another normal\n",
+        GetParam().name, name, found.other_number, found.scenes, found.other_depth, found.manifolds,
+        found.other_normal);
+  }
+  EXPECT_GT(flat.manifolds, 200);
+  EXPECT_GT(deep.manifolds, 150);
+  EXPECT_LE(flat.other_number + deep.other_number, 2);
+  EXPECT_LE(flat.other_depth, flat.manifolds / 50);
+  EXPECT_LE(flat.other_normal, flat.manifolds / 50);
+  EXPECT_LE(deep.other_depth, deep.manifolds / 12);
+  EXPECT_LE(deep.other_normal, deep.manifolds / 50);
 }
 
 INSTANTIATE_TEST_SUITE_P(Solids, Triangulations, testing::ValuesIn(solids()),

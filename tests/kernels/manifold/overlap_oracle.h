@@ -13,10 +13,10 @@ using OracleTriangles = std::vector<std::array<manifold::Vector3, 3>>;
 /// A connected piece of the overlap: its surface, outward normals by the order of corners.
 struct OverlapPiece {
   OracleTriangles triangles;
-  std::vector<bool> is_of_a;      ///< whether a triangle lies in the surface of a
-  manifold::Vector3 area;         ///< of a's surface in it, as a vector along a's outward normal
-  double whole_area_a = 0;        ///< the sum of its triangles' areas
-  double whole_area_b = 0;        ///< the same of b's
+  std::vector<bool> is_of_a;  ///< whether a triangle lies in the surface of a
+  manifold::Vector3 area;     ///< of a's surface in it, as a vector along a's outward normal
+  double whole_area_a = 0;    ///< the sum of its triangles' areas
+  double whole_area_b = 0;    ///< the same of b's
   double volume = 0;
 };
 

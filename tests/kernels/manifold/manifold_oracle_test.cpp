@@ -191,6 +191,28 @@ TEST_P(ConvexManifolds, AreOneForEveryOverlapAndItsDepthPartsTheBodies) {
 INSTANTIATE_TEST_SUITE_P(Bodies, ConvexManifolds, testing::ValuesIn(convex_bodies()),
                          [](const auto& tested) { return std::string(tested.param.name); });
 
+/// Spheres of triangles are polyhedra: a corner pushes along the face that it is in, which leans, since that
+/// parts them soonest.
+TEST(Spheres, ThatOverlapALittlePushAlongTheAxisThatPartsThemSoonest) {
+  RandomPoses random(33);
+  const Mesh mesh = sphere(0.5, 2);
+  const Axes axes(mesh);
+  ManifoldScene scene;
+  scene.add_body(scene.add_shape(mesh), kIdentityPose);
+  scene.add_body(0, kIdentityPose);
+  for (int trial = 0; trial < trials(60, 20); ++trial) {
+    const double overlap = trial % 2 == 0 ? 5e-5 : 5e-4;
+    scene.bodies[0].pose = any_motion(random, 0);
+    Pose pose = after(shift(0, 0, 0.9), any_motion(random, 0));
+    const double apart = ConvexPair(axes, scene.bodies[0].pose, axes, pose).along({0, 0, 1});
+    scene.bodies[1].pose = pose = after(shift(0, 0, apart - overlap), pose);
+    scene.find();
+    ASSERT_EQ(scene.manifolds().size(), 1u);
+    const double least = ConvexPair(axes, scene.bodies[0].pose, axes, pose).least();
+    EXPECT_LT(scene.manifolds()[0].depth, (trial % 2 == 0 ? 1.001 : 1.01) * least);
+  }
+}
+
 /// Bodies of bulges and hollows: b stays in contact until it has moved by the depth.
 TEST(AnyBodies, DoNotPartBeforeOneHasMovedByTheDepth) {
   RandomPoses random(12);
@@ -229,7 +251,7 @@ TEST(AnyBodies, DoNotPartBeforeOneHasMovedByTheDepth) {
     }
   }
   EXPECT_GT(seen, 200);
-  EXPECT_GT(parted, seen * 3 / 5);
+  EXPECT_GT(parted, seen * 7 / 10);
 }
 
 /// The tubes of two links are saddles where they meet: neither lies behind the planes of its triangles.

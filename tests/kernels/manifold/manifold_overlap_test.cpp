@@ -121,7 +121,7 @@ struct Findings {
   int manifolds = 0, beside = 0;       ///< no point of one lies in a piece
   int one = 0, shrinks = 0, ends = 0;  ///< of pieces with one manifold, those that its normal shrinks at
                                        ///< once, or once b has moved by the depth
-  int shallow = 0, half = 0;  ///< depths below 0.99 and 0.5 of the longest stretch along the normal
+  int shallow = 0, half = 0;           ///< depths below 0.99 and 0.5 of the longest stretch along the normal
 };
 
 class Overlaps : public testing::TestWithParam<Body> {

@@ -18,6 +18,7 @@ struct Shape {
   Vector3 centre;       ///< of the bounds, stored coordinates
   double diagonal = 0;  ///< of the bounds
   bool closed = false;
+  std::uint32_t triangle_count = 0;
 };
 
 /// A body of a pair, posed.

@@ -25,6 +25,10 @@ inline constexpr int kMostSeeds = 4;
 /// A line is the deepest if none is deeper by more than this part.
 inline constexpr double kDeepEnough = 1e-6;
 
+/// If the deepest line through the first points is deeper than this part of the patch's reach, the overlap is
+/// no flat one, and may have several places where it is deep. Lines go through more points then.
+inline constexpr double kNotFlat = 0.1;
+
 /// The search looks at no more lines than this, beside those through the first points.
 inline constexpr int kMostSteps = 16;
 
@@ -80,7 +84,7 @@ class DeepestLine {
 
   /// Finds points of the overlap beside some pieces, `wanted` at most; find() needs them. middle: of the
   /// pieces. The first questions, `asked`, are others', and are answered too.
-  TANDEM_HD void find_seeds(const Vector3& middle, int wanted, std::uint32_t asked = 0);
+  TANDEM_HD void find_seeds(const Vector3& middle, double reach, int wanted, std::uint32_t asked = 0);
 
   /// Returns what find() found.
   TANDEM_HD OverlapLine best() const {
@@ -99,11 +103,15 @@ class DeepestLine {
                              const double& enough);
 
  private:
+  TANDEM_HD int follow_lines_through(const Vector3* points, int count, double reach, double& depth);
+  TANDEM_HD void search_from_seeds(const double& enough);
+  TANDEM_HD_CALLED bool goes_on_elsewhere() const;
+  TANDEM_HD_CALLED bool look_around(const Vector3& middle, double reach);
   TANDEM_HD void begin_half_spaces(const Vector3& middle, double reach);
   TANDEM_HD_CALLED void learn(int side, const Crossing& surface, HalfSpace& out) const;
   /// Forgets half-spaces beyond which the bodies go on, up to these heights on a line.
   TANDEM_HD void go_beyond(const Vector2& at, const double (&height)[2]) {
-    shared_.spaces.drop_before(team_, at, height, 16 * bodies_.tolerance());
+    not_convex_ = shared_.spaces.drop_before(team_, at, height, 16 * bodies_.tolerance()) || not_convex_;
   }
   TANDEM_HD void propose(int seed);
   /// Looks how deep is enough. It is called by one of the team.
@@ -122,26 +130,37 @@ class DeepestLine {
   static constexpr int kLines = 4;  ///< of a step: along the proposed line, and straight to its ends
 
   bool one_region_;
+  bool not_convex_ = false;  ///< a body goes on beyond a half-space
   std::uint32_t begin_, end_;
   SearchMemory& shared_;
 };
 
 template <typename Team>
-TANDEM_HD void DeepestLine<Team>::find_seeds(const Vector3& middle, int wanted, std::uint32_t asked) {
+TANDEM_HD void DeepestLine<Team>::find_seeds(const Vector3& middle, double reach, int wanted,
+                                             std::uint32_t asked) {
   const OverlapLines<Team> lines(team_, bodies_, memory_, shared_.lines);
-  Vector3 apart_from[kMostSeeds] = {middle}, inside[kMostSeeds];
-  std::uint32_t beside[kMostSeeds] = {};
-  for (int i = 0; i < wanted; ++i) {
-    beside[i] = lines.extreme_piece(begin_, end_, apart_from, i == 0 ? 1 : i, i == 0 ? 1 : -1);
-    apart_from[i] = memory_.pieces[beside[i]].middle();
+  const CurvePlaces<Team> places(team_, memory_);
+  // The nearest to the middle, the furthest from that, and the furthest off the line of these on either side.
+  Place place[kMostSeeds];
+  Vector3 inside[kMostSeeds], along, across;
+  place[0] = places.nearest_place(begin_, end_, middle, reach);
+  for (int i = 1; i < wanted; ++i) {
+    if (i == 2) along = place[1].at - place[0].at;
+    if (i == 3) across = cross(cross(along, place[2].at - place[0].at), along);
+    place[i] = places.furthest_place(begin_, end_, reach, [&](const Vector3& x) {
+      const Vector3 from = x - place[0].at;
+      if (i == 1) return dot(from, from);
+      const Vector3 off = cross(along, from);
+      return i == 2 ? dot(off, off) : -dot(across, from);
+    });
   }
   const double most = greater(bodies_.a.shape->diagonal, bodies_.b.shape->diagonal);
-  const std::uint32_t found = lines.go_inside(beside, wanted, most, inside, asked);
+  const std::uint32_t found = lines.go_inside(place, wanted, most, inside, asked);
   if (team_.rank() == 0) {
     int count = 0;
     for (int i = 0; i < wanted; ++i) {
       if ((found >> i & 1u) == 0) continue;
-      shared_.seeds.at[count] = inside[i], shared_.seeds.beside[count] = beside[i];
+      shared_.seeds.at[count] = inside[i], shared_.seeds.beside[count] = place[i].piece;
       ++count;
     }
     shared_.seeds.count = count;
@@ -149,33 +168,121 @@ TANDEM_HD void DeepestLine<Team>::find_seeds(const Vector3& middle, int wanted, 
   team_.sync();
 }
 
+/// Follows the lines along the normal through points of the overlap, LineMemory::kMost / 2 at most. Result:
+/// the point on whose line the bodies overlap most, -1 if they overlap on none. depth: how much that is.
 template <typename Team>
-TANDEM_HD void DeepestLine<Team>::begin_with_seeds(const PatchFrame& frame, double reach) {
+TANDEM_HD int DeepestLine<Team>::follow_lines_through(const Vector3* points, int count, double reach,
+                                                      double& depth) {
   LineQuestion* const line = shared_.lines.line;
   LineQuestions questions(bodies_, line);
-  const auto count = 2 * static_cast<std::uint32_t>(shared_.seeds.count);
-  if (team_.rank() == 0) shared_.frame = frame;
-  team_.sync();
-  for (std::uint32_t i = team_.rank(); i < count; i += team_.size()) {
-    const Vector3& seed = shared_.seeds.at[i / 2];
-    const int side = static_cast<int>(i % 2);
-    const double from = frame.height(seed);
-    questions.ask(i, shared_.frame, side, side == 0 ? 1 : -1, frame.flat(seed), from,
-                  side == 0 ? from : -INFINITY, side == 0 ? INFINITY : from, reach, kGrazes);
+  team_.sync();  // all have read the answers before
+  for (int i = static_cast<int>(team_.rank()); i < 2 * count; i += static_cast<int>(team_.size())) {
+    const Vector3& point = points[i / 2];
+    const int side = i % 2;
+    const double from = shared_.frame.height(point);
+    questions.ask(static_cast<std::uint32_t>(i), shared_.frame, side, side == 0 ? 1 : -1,
+                  shared_.frame.flat(point), from, side == 0 ? from : -INFINITY, side == 0 ? INFINITY : from,
+                  reach, kGrazes);
   }
   team_.sync();
-  if (count > 0) walk_lines(team_, questions, count, line);
+  if (count > 0) walk_lines(team_, questions, 2 * static_cast<std::uint32_t>(count), line);
+  int deepest = -1;
+  depth = 0;
+  for (int i = 0; i < count; ++i) {
+    const Crossing &top = line[2 * i].best, &bottom = line[2 * i + 1].best;
+    if (top.found() && bottom.found() && top.height - bottom.height > depth)
+      depth = top.height - bottom.height, deepest = i;
+  }
+  return deepest;
+}
+
+template <typename Team>
+TANDEM_HD void DeepestLine<Team>::begin_with_seeds(const PatchFrame& frame, double reach) {
+  team_.sync();
+  if (team_.rank() == 0) shared_.frame = frame;
+  team_.sync();
+  double depth;
+  const int from = follow_lines_through(shared_.seeds.at, shared_.seeds.count, reach, depth);
   if (team_.rank() == 0) {
     shared_.best = {};
     shared_.is_loose = false;
-    for (int i = 0; i < shared_.seeds.count; ++i) {
-      const Crossing &top = line[2 * i].best, &bottom = line[2 * i + 1].best;
-      if (!top.found() || !bottom.found() || !(top.height - bottom.height > shared_.best.depth())) continue;
-      shared_.best = {{top.triangle, bottom.triangle}, line[2 * i].at, {top.height, bottom.height}};
-      shared_.from = i;
+    if (from >= 0) {
+      const LineQuestion &top = shared_.lines.line[2 * from], &bottom = shared_.lines.line[2 * from + 1];
+      shared_.best = {
+          {top.best.triangle, bottom.best.triangle}, top.at, {top.best.height, bottom.best.height}};
+      shared_.from = from;
     }
   }
   team_.sync();
+}
+
+/// Returns whether some corners show that a body goes on beyond its half-spaces, and so is not convex.
+template <typename Team>
+TANDEM_HD_CALLED bool DeepestLine<Team>::goes_on_elsewhere() const {
+  constexpr std::uint32_t kCorners = 32;  // of each body
+  bool goes_on = false;
+  for (std::uint32_t i = team_.rank(); i < 2 * kCorners; i += team_.size()) {
+    const int side = static_cast<int>(i % 2);
+    const Shape& shape = *bodies_[side].shape;
+    const auto triangle = static_cast<std::uint32_t>(std::uint64_t{i / 2} * shape.triangle_count / kCorners);
+    const Vector3 x = bodies_[side].corner(triangle, 0);
+    goes_on = goes_on || shared_.spaces.any_before(side, shared_.frame.flat(x), shared_.frame.height(x),
+                                                   kNearEnd * shape.diagonal);
+  }
+  return team_.any(goes_on);
+}
+
+/// Follows the lines through more points of the overlap: those between the outermost places of the curve and
+/// what is opposite within both bodies. True if one is deeper than the best line: its point becomes a seed.
+template <typename Team>
+TANDEM_HD_CALLED bool DeepestLine<Team>::look_around(const Vector3& middle, double reach) {
+  constexpr int kPlaces = 8, kPoints = 4;
+  const OverlapLines<Team> lines(team_, bodies_, memory_, shared_.lines);
+  const CurvePlaces<Team> places(team_, memory_);
+  const Vector3 n = shared_.frame.n;
+  const auto furthest_along = [&](const Vector3& direction) {
+    return places.furthest_place(begin_, end_, reach,
+                                 [&](const Vector3& x) { return dot(x - middle, direction); });
+  };
+  Vector3 along =
+      places
+          .furthest_place(begin_, end_, reach, [&](const Vector3& x) { return dot(x - middle, x - middle); })
+          .at -
+      middle;
+  along = along - dot(along, n) * n;
+  const Vector3 across = cross(n, along);
+  Place place[kPlaces];
+  Vector3 inside[kPlaces], point[kPlaces], deepest;
+  constexpr int kStep[kPlaces] = {1, 1, 0, -1, -1, -1, 0, 1};  // eighths of a turn
+  for (int i = 0; i < kPlaces; ++i) {
+    const double x = kStep[i], y = kStep[(i + 6) % kPlaces];
+    place[i] = furthest_along(x * along + y * across);
+  }
+  const double most = greater(bodies_.a.shape->diagonal, bodies_.b.shape->diagonal);
+  const std::uint32_t found = lines.go_inside(place, kPlaces, most, inside);
+  double most_depth = shared_.best.depth();
+  int best = -1;
+  for (int k = 0; k < kPoints; ++k) {
+    int count = 0, from[kPlaces];
+    for (int i = 0; i < kPlaces; ++i) {
+      if ((found >> i & 1u) == 0) continue;
+      point[count] = place[i].at + (0.1 + 0.6 * k) * (inside[i] - place[i].at);
+      from[count++] = i;
+    }
+    double depth;
+    const int here = follow_lines_through(point, count, reach, depth);
+    if (here >= 0 && depth > most_depth) most_depth = depth, deepest = point[here], best = from[here];
+  }
+  team_.sync();  // all have read the best line
+  if (team_.rank() == 0 && best >= 0) {
+    Seeds& seeds = shared_.seeds;
+    const int last = kMostSeeds - 1, at = seeds.count <= last    ? seeds.count++
+                                          : shared_.from == last ? last - 1
+                                                                 : last;
+    seeds.at[at] = deepest, seeds.beside[at] = place[best].piece;
+  }
+  team_.sync();
+  return best >= 0;
 }
 
 /// Finds the half-space of a triangle that a line met; none if there is no triangle.
@@ -371,13 +478,9 @@ TANDEM_HD_CALLED void DeepestLine<Team>::go_to_ends() {
   team_.sync();
 }
 
+/// Improves the best of the lines through the seeds.
 template <typename Team>
-TANDEM_HD_CALLED void DeepestLine<Team>::find(const PatchFrame& frame, const Vector3& middle, double reach,
-                                              const double& enough) {
-  if (team_.rank() == 0) see(enough);
-  begin_with_seeds(frame, reach);
-  if (!shared_.best.found() || is_deep_enough()) return;
-  begin_half_spaces(middle, reach);
+TANDEM_HD void DeepestLine<Team>::search_from_seeds(const double& enough) {
   const int deepest = shared_.from;
   for (int i = 0; i < shared_.seeds.count && !is_deep_enough(); ++i) {
     const int seed = i == 0 ? deepest : i <= deepest ? i - 1 : i;
@@ -392,6 +495,21 @@ TANDEM_HD_CALLED void DeepestLine<Team>::find(const PatchFrame& frame, const Vec
       team_.sync();
     } while (shared_.proposed.found && shared_.steps < kMostSteps && !is_deep_enough() && step(seed));
   }
+}
+
+template <typename Team>
+TANDEM_HD_CALLED void DeepestLine<Team>::find(const PatchFrame& frame, const Vector3& middle, double reach,
+                                              const double& enough) {
+  if (team_.rank() == 0) see(enough);
+  begin_with_seeds(frame, reach);
+  if (!shared_.best.found() || is_deep_enough()) return;
+  begin_half_spaces(middle, reach);
+  if (shared_.best.depth() > kNotFlat * reach && (not_convex_ || goes_on_elsewhere()) &&
+      look_around(middle, reach)) {
+    begin_with_seeds(frame, reach);
+    begin_half_spaces(middle, reach);
+  }
+  search_from_seeds(enough);
   go_to_ends();
 }
 

@@ -21,6 +21,7 @@ manifold::Shape shape_of(const GpuAsset& asset) {
   shape.blocks = asset.tree.blocks;
   shape.oriented_blocks = asset.tree.oriented_blocks;
   manifold::set_bounds(asset.lower, asset.upper, asset.origin, shape);
+  shape.triangle_count = asset.tree.triangle_count;
   shape.closed = asset.tree.closed;
   return shape;
 }

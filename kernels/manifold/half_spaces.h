@@ -70,20 +70,21 @@ class HalfSpaces {
     if (team.any(drops) && team.rank() == 0) begin_basis();
     team.sync();
   }
-  /// Forgets those beyond which the body goes on.
+  /// Forgets those beyond which the body goes on. Result: whether there are any.
   template <typename Team>
-  TANDEM_HD_CALLED void drop_before(const Team& team, const Vector2& at, const double (&height)[2],
+  TANDEM_HD_CALLED bool drop_before(const Team& team, const Vector2& at, const double (&height)[2],
                                     double tolerance) {
-    bool drops = false;
+    bool drops = false, any = false;
     for (int i = first_of(team); i < kMost; i += step_of(team)) {
       HalfSpace& of = space[i];
       if (of.triangle == kNoIndex || !(of.beyond(at, of.side == 0 ? height[0] : height[1]) > tolerance))
         continue;
-      drops = drops || basis_.has(kWalls + i);
+      drops = drops || basis_.has(kWalls + i), any = true;
       of.triangle = kNoIndex, of.counts = false;
     }
     if (team.any(drops) && team.rank() == 0) begin_basis();
     team.sync();
+    return team.any(any);
   }
   /// Returns whether a point is in the plane of one of the first ones.
   template <typename Team>
@@ -108,6 +109,14 @@ class HalfSpaces {
     const double least = team.least(nearest);
     const int place = team.least(nearest == least ? own : kMost);
     return place < kMost ? space[place].triangle : kNoIndex;
+  }
+  /// Returns whether a point of a body lies beyond one of its half-spaces.
+  TANDEM_HD bool any_before(int side, const Vector2& at, double height, double tolerance) const {
+    bool is = false;
+    for (int i = 0; i < kMost; ++i)
+      is = is || (space[i].triangle != kNoIndex && space[i].side == side &&
+                  space[i].beyond(at, height) > tolerance);
+    return is;
   }
   /// Returns whether a line is on the square's border.
   TANDEM_HD bool on_wall(const Vector2& at, double within) const {

@@ -173,9 +173,11 @@ TANDEM_HD_CALLED void ManifoldMaker<Team>::begin_deep(std::uint32_t region, Outl
   const CurveMeasure& measure = shared.measure;
   const int lines = normal_finder.gather_for_deep(measure);
   const double reach = normal_finder.reach_from(measure.middle);
-  DeepestLine<Team>(team_, bodies_, memory_, summary_, region, depths).find_seeds(measure.middle, kMostSeeds);
+  DeepestLine<Team>(team_, bodies_, memory_, summary_, region, depths)
+      .find_seeds(measure.middle, reach, kMostSeeds);
   if (team_.rank() == 0) {
-    patch.measure = measure, patch.reach = reach, patch.directions = 2 * lines;
+    patch.measure = measure, patch.reach = reach, patch.both_ways = shared.normal.both_ways;
+    patch.directions = patch.both_ways ? 2 * lines : lines;
     patch.enough = INFINITY;
     for (int i = 0; i < lines; ++i) patch.tried[i] = shared.normal.tried[i];
     patch.seeds = depths.seeds;
@@ -228,15 +230,16 @@ TANDEM_HD_CALLED void ManifoldMaker<Team>::make_deep(std::uint32_t region, Outli
   begin_deep(region, shared, depths, patch);
   // The directions along which the first lines are shallowest come first; of others little more is looked at.
   double known[2 * kMostTried];
+  const auto depth_of = [](const OverlapLine& line) { return line.found() ? line.depth() : INFINITY; };
   const double none = 0;
-  for (int i = 0; i < patch.directions; ++i)
-    known[i] = enough_for_others(line_along(region, patch, i, depths, none));
+  for (int i = 0; i < patch.directions; ++i) known[i] = depth_of(line_along(region, patch, i, depths, none));
   double enough = INFINITY;
   for (int k = 0; k < patch.directions; ++k) {
     int next = -1;
     for (int i = 0; i < patch.directions; ++i) {
       if (known[i] >= 0 && (next < 0 || known[i] < known[next])) next = i;
     }
+    if (known[next] >= enough) break;  // nor is any of the others shallower
     known[next] = -1;
     found.along[next] = line_along(region, patch, next, depths, enough);
     enough = lesser(enough, enough_for_others(found.along[next]));
@@ -306,7 +309,7 @@ TANDEM_HD void ManifoldMaker<Team>::measure_depths(std::uint32_t region, SearchM
   if (state_.kind != PatchKind::overlap) return;
   DeepestLine<Team> search(team_, bodies_, memory_, summary_, region, shared);
   const int wanted = state_.candidates <= kFewCandidates ? kMostSeeds / 2 : kMostSeeds;
-  search.find_seeds(state_.centre, wanted, ask_at_rim(shared.lines));
+  search.find_seeds(state_.centre, state_.reach, wanted, ask_at_rim(shared.lines));
   take_rim(shared.lines);
   const double enough = INFINITY;
   search.find(state_.frame, state_.centre, state_.reach, enough);

@@ -8,6 +8,58 @@ namespace tandem::manifold {
 /// float32 corners are not quite flat.
 inline constexpr double kNearEnd = 1e-6;
 
+/// A place on a curve that is chosen for where it is lies at least this part of the curve's reach beside the
+/// ends of its piece, if the piece is long enough: at an end both triangles of an edge have it, and rounding
+/// decides.
+inline constexpr double kOffEnd = 0x1p-10;
+
+/// A place on a curve. It is found by its coordinates, not by numbers of triangles, so it hardly depends on
+/// how the surfaces are cut into triangles.
+struct Place {
+  Vector3 at;
+  std::uint32_t piece;
+};
+
+/// Finds places on the pieces order[begin] to order[end - 1].
+template <typename Team>
+class CurvePlaces {
+ public:
+  TANDEM_HD CurvePlaces(const Team& team, const PieceMemory& memory) : team_(team), memory_(memory) {}
+
+  /// Returns the place that is nearest to a point. reach: of the
+  /// pieces.
+  TANDEM_HD Place nearest_place(std::uint32_t begin, std::uint32_t end, const Vector3& from,
+                                double reach) const {
+    return least_place(begin, end, [&](const Piece& piece, Vector3& at) {
+      at = nearest_on(piece, from, kOffEnd * reach);
+      return dot(at - from, at - from);
+    });
+  }
+  /// Returns the place that has most of a convex function. That is an end of a piece, and none between pieces
+  /// into which a straight one is cut.
+  template <typename Value>
+  TANDEM_HD Place furthest_place(std::uint32_t begin, std::uint32_t end, double reach,
+                                 const Value& value) const {
+    return least_place(begin, end, [&](const Piece& piece, Vector3& at) {
+      const Vector3 p = nearest_on(piece, piece.end[0], kOffEnd * reach),
+                    q = nearest_on(piece, piece.end[1], kOffEnd * reach);
+      const double of_p = value(p), of_q = value(q);
+      at = of_p >= of_q ? p : q;
+      return -greater(of_p, of_q);
+    });
+  }
+  /// Returns the point of a piece that is nearest to another one and not too near to its ends.
+  TANDEM_HD static Vector3 nearest_on(const Piece& piece, const Vector3& from, double off_end);
+
+ private:
+  /// Returns the place of the least value; of several that of the least triangles.
+  template <typename ValueOf>
+  TANDEM_HD Place least_place(std::uint32_t begin, std::uint32_t end, const ValueOf& value_of) const;
+
+  const Team& team_;
+  const PieceMemory& memory_;
+};
+
 /// Lines that a team follows at once, each in a frame of its own where that is needed.
 struct LineMemory {
   static constexpr int kMost = 20;
@@ -25,18 +77,12 @@ class OverlapLines {
                          LineMemory& shared)
       : team_(team), bodies_(bodies), memory_(memory), shared_(shared) {}
 
-  /// Returns the piece of order[begin] to order[end - 1] that is nearest to a point (sign 1) or furthest from
-  /// all of some points (-1); of several the one of the least triangles.
-  TANDEM_HD std::uint32_t extreme_piece(std::uint32_t begin, std::uint32_t end, const Vector3* from,
-                                        int points, double sign) const;
-
-  /// Finds a point of the overlap beside each of some pieces: half-way from
-  /// the middle of the piece, behind both triangles, to where the overlap ends on that line, but no further
-  /// than `most`. Result: a bit for each piece; 0 where its triangles face each other, or the line is not
-  /// within both bodies. The first questions, `asked`, are others'; with them there are at most
-  /// LineMemory::kMost.
-  TANDEM_HD_CALLED std::uint32_t go_inside(const std::uint32_t* piece, int count, double most,
-                                           Vector3* inside, std::uint32_t asked = 0) const;
+  /// Finds a point of the overlap beside each of some places: half-way from there, behind both triangles, to
+  /// where the overlap ends on that line, but no further than `most`. Result: a bit for each place; 0 where
+  /// its triangles face each other, or the line is not within both bodies. The first questions, `asked`, are
+  /// others'; with them there are at most LineMemory::kMost.
+  TANDEM_HD_CALLED std::uint32_t go_inside(const Place* place, int count, double most, Vector3* inside,
+                                           std::uint32_t asked = 0) const;
 
   /// Asks where a straight line within a, and one within b, from one point to two others meet the surface of
   /// the body, if they do so before they are there. The point is within both, perhaps hardly: a line that
@@ -61,34 +107,43 @@ class OverlapLines {
 };
 
 template <typename Team>
-TANDEM_HD std::uint32_t OverlapLines<Team>::extreme_piece(std::uint32_t begin, std::uint32_t end,
-                                                          const Vector3* from, int points,
-                                                          double sign) const {
+TANDEM_HD Vector3 CurvePlaces<Team>::nearest_on(const Piece& piece, const Vector3& from, double off_end) {
+  if (piece.kind() == MeetingKind::polygon) return piece.end[0];
+  const Vector3 along = piece.end[1] - piece.end[0];
+  const double length = norm(along);
+  if (!(length > 2 * off_end)) return piece.middle();
+  const Vector3 e = (1 / length) * along;
+  return piece.end[0] + lesser(greater(dot(e, from - piece.end[0]), off_end), length - off_end) * e;
+}
+
+template <typename Team>
+template <typename ValueOf>
+TANDEM_HD Place CurvePlaces<Team>::least_place(std::uint32_t begin, std::uint32_t end,
+                                               const ValueOf& value_of) const {
   double least = INFINITY;
   LeastPiece own;
+  Vector3 at;
   for (std::uint32_t i = begin + team_.rank(); i < end; i += team_.size()) {
-    const std::uint32_t at = memory_.order[i];
-    const Vector3 middle = memory_.pieces[at].middle();
-    double nearest = INFINITY;
-    for (int k = 0; k < points; ++k) nearest = lesser(dot(middle - from[k], middle - from[k]), nearest);
-    const double distance = sign * nearest;
-    if (distance < least) least = distance, own = {};
-    if (distance == least) own.take(memory_.pieces[at].symmetric_key(), at);
+    const double value = value_of(memory_.pieces[memory_.order[i]], at);
+    if (value < least) least = value, own = {};
+    if (value == least) own.take(memory_.pieces[memory_.order[i]].symmetric_key(), memory_.order[i]);
   }
   const double least_of_all = team_.least(least);
   if (least != least_of_all) own = {};
   const std::uint64_t key = team_.least(own.key);
-  return team_.least(own.key == key ? own.piece : kNoIndex);
+  Place out;
+  out.piece = team_.least(own.key == key ? own.piece : kNoIndex);
+  value_of(memory_.pieces[out.piece], out.at);
+  return out;
 }
 
 template <typename Team>
-TANDEM_HD_CALLED std::uint32_t OverlapLines<Team>::go_inside(const std::uint32_t* piece, int count,
-                                                             double most, Vector3* inside,
-                                                             std::uint32_t asked) const {
+TANDEM_HD_CALLED std::uint32_t OverlapLines<Team>::go_inside(const Place* place, int count, double most,
+                                                             Vector3* inside, std::uint32_t asked) const {
   LineQuestions questions(bodies_, shared_.line);
   team_.sync();
   for (int i = static_cast<int>(team_.rank()); i < count; i += static_cast<int>(team_.size())) {
-    const float* n = memory_.normals + 6 * std::size_t{piece[i]};
+    const float* n = memory_.normals + 6 * std::size_t{place[i].piece};
     const Vector3 sum = {-double{n[0]} - double{n[3]}, -double{n[1]} - double{n[4]},
                          -double{n[2]} - double{n[5]}};
     const double length = norm(sum);
@@ -99,15 +154,15 @@ TANDEM_HD_CALLED std::uint32_t OverlapLines<Team>::go_inside(const std::uint32_t
       shared_.line[line].side = shared_.line[line + 1].side = -1;
       continue;
     }
-    const Piece& of = memory_.pieces[piece[i]];
-    Vector3 middle = 0.5 * (of.end[0] + of.end[1]);
+    const Piece& of = memory_.pieces[place[i].piece];
+    Vector3 from = place[i].at;
     if (of.kind() == MeetingKind::polygon) {
       Meeting meeting;
       meet_again(bodies_, of, meeting);
-      middle = {};
-      for (int k = 0; k < meeting.corners; ++k) middle = middle + (1.0 / meeting.corners) * meeting.corner[k];
+      from = {};
+      for (int k = 0; k < meeting.corners; ++k) from = from + (1.0 / meeting.corners) * meeting.corner[k];
     }
-    frame = PatchFrame(middle, (1 / length) * sum);
+    frame = PatchFrame(from, (1 / length) * sum);
     const double begin = behind(most);
     for (std::uint32_t side = 0; side < 2; ++side)
       questions.ask(line + side, frame, static_cast<int>(side), 0, {}, begin, begin, INFINITY, INFINITY,

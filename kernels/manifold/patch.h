@@ -80,7 +80,8 @@ struct Direction {
 struct NormalMemory {
   Direction direction[kMostTried];  ///< of faces of a, then of b
   Vector3 tried[kMostTried];
-  int count;  ///< of those tried, where that is not known to all
+  int count;       ///< of those tried, where that is not known to all
+  bool both_ways;  ///< of a deep patch: they are tried the other way as well
   Spread spread[kMostTried];
 };
 
@@ -206,14 +207,17 @@ struct PatchState {
 /// A patch whose overlap is to be measured along many directions.
 struct DeepPatch {
   CurveMeasure measure;
-  double reach;    ///< of the pieces, from their middle
-  int directions;  ///< along each line that is tried, both ways
+  double reach;  ///< of the pieces, from their middle
+  int directions;
+  bool both_ways;  ///< along each line that is tried
   double enough;   ///< for the lines along other directions, where several are looked for at once
   Vector3 tried[kMostTried];
   Seeds seeds;
 
-  /// A direction that is tried: each line one way and the other.
-  TANDEM_HD Vector3 along(int i) const { return i % 2 == 0 ? tried[i / 2] : -tried[i / 2]; }
+  TANDEM_HD Vector3 along(int i) const {
+    if (!both_ways) return tried[i];
+    return i % 2 == 0 ? tried[i / 2] : -tried[i / 2];
+  }
 };
 
 /// The deepest line along each direction of a deep patch; none where that is not known to be the shallowest.

@@ -16,11 +16,18 @@ inline constexpr double kClosed = 1e-6;
 /// Faces in so few directions on both sides make a patch one of flat faces; otherwise it is a smooth one.
 inline constexpr int kMostDirections = 5;
 
-/// Adding this part of a number and taking it off again leaves some 12 bits of a float32.
-inline constexpr double kAbout = 4095;
+/// Adding this number to one below 1 and taking it off again leaves some 12 bits behind the point.
+inline constexpr float kAbout = 2048;
+
+/// Faces whose normals have more than this cosine lie across one line.
+inline constexpr float kSameLine = 1 - 1e-6f;
 
 /// A smooth patch lies on a face if this part of its curve lies in the face's plane.
 inline constexpr double kBearing = 0.9;
+
+/// A patch pushes along the normal of a face only if the cosine of its angle to the area vector is this at
+/// least.
+inline constexpr double kLeastAlong = 0.1;
 
 /// Faces of two bodies are flush, as seen from a to b, where the cosine of their normals is below this.
 inline constexpr double kFlush = -0.9995;
@@ -44,9 +51,9 @@ class NormalFinder {
   /// Condition: measure(), whose result this is.
   TANDEM_HD PatchNormal find(const CurveMeasure& curve);
 
-  /// Gathers in NormalMemory::tried the lines along which a deep patch may push, one way or the other: that
-  /// of the area vector, or of the triangles of sheets, and normals of faces of both bodies. Result: how
-  /// many.
+  /// Gathers in NormalMemory::tried the directions along which a deep patch may push: that of the area
+  /// vector, or of the triangles of sheets, and normals of faces of both bodies. Result: how many. Where the
+  /// area says which way a patch pushes, they point that way; else NormalMemory::both_ways is true.
   TANDEM_HD_CALLED int gather_for_deep(const CurveMeasure& curve);
 
   /// Returns the distance of the piece's end that is furthest from a point.
@@ -72,13 +79,15 @@ class NormalFinder {
   TANDEM_HD bool has_many_directions(int side) const;
   TANDEM_HD LeastPiece least_unmarked(int side, const FloatVector& known) const;
   TANDEM_HD bool gather_directions(int side, bool keep_if_many);
-  TANDEM_HD_CALLED void gather_longest(int side);
+  TANDEM_HD_CALLED Vector3 longest_line(const Vector3& middle) const;
+  TANDEM_HD_CALLED void gather_unlike(int side, const Vector3& line, const Vector3& push);
   TANDEM_HD void find_faces_along(const Vector3& smooth, std::uint32_t (&holder)[2]) const;
   TANDEM_HD void sum_lengths_on_faces(const FloatVector (&face)[2], const std::uint32_t (&holder)[2],
                                       ExactSum (&within)[2]) const;
   TANDEM_HD void find_bearing_faces(const Vector3& smooth, double length);
   TANDEM_HD void spread_along(int count) const;
   TANDEM_HD Vector3 face_nearest(const Vector3& smooth, double length);
+  TANDEM_HD double height_along(const Vector3& n) const;
   /// Returns how far b must move along a direction until a plane lies between all triangles of the region.
   TANDEM_HD_CALLED double separation_along(const Vector3& n) const;
   TANDEM_HD_CALLED int find_for_touch(Vector3& n);
@@ -114,6 +123,7 @@ class NormalFinder {
   std::uint32_t begin_, end_;
   LeastPiece least_;  // of those that this one of the team sees
   int directions_ = 0;
+  bool several_faces_ = false;  ///< face_nearest() had to choose between faces
 };
 
 template <typename Team>
@@ -415,9 +425,10 @@ TANDEM_HD Vector3 NormalFinder<Team>::face_nearest(const Vector3& smooth, double
   add(smooth);
   for (int i = 0; i < directions_; ++i) {
     const Vector3 n = shared_.direction[i].n;
-    if (dot(n, smooth) >= 0.1) add(n);
+    if (dot(n, smooth) >= kLeastAlong) add(n);
   }
   if (count == 1) return smooth;
+  several_faces_ = of_a != kMost && of_b != kMost;
   team_.sync();
   spread_along(count);
   const auto separation = [&](int i) { return shared_.spread[i].highest_a - shared_.spread[i].lowest_b; };
@@ -427,6 +438,20 @@ TANDEM_HD Vector3 NormalFinder<Team>::face_nearest(const Vector3& smooth, double
     if (separation(i) < least) best = i, least = separation(i) * (1 - 1e-9);
   }
   return shared_.tried[best];
+}
+
+/// Returns how high the curve is along a direction.
+template <typename Team>
+TANDEM_HD double NormalFinder<Team>::height_along(const Vector3& n) const {
+  double furthest[2] = {-INFINITY, -INFINITY};
+  for_each_piece([&](const Piece& piece, const float*) {
+    for (int end = 0; end < (piece.kind() == MeetingKind::polygon ? 1 : 2); ++end) {
+      const double height = dot(n, piece.end[end] - summary_.origin);
+      furthest[0] = greater(furthest[0], height), furthest[1] = greater(furthest[1], -height);
+    }
+  });
+  team_.greatest_ones(furthest);
+  return furthest[0] + furthest[1];
 }
 
 template <typename Team>
@@ -531,36 +556,42 @@ TANDEM_HD_CALLED int NormalFinder<Team>::find_for_touch(Vector3& n) {
   return found == 0 ? find_crossing_edges(n) : lesser(found, 2);
 }
 
-/// Adds the directions of faces of one body that have the longest pieces; of pieces about as long, that of
-/// the least triangles comes first.
+/// Adds the directions of faces of one body that differ most from each other and from a line, whichever way
+/// they point, of those that push along a unit vector, or of all where that is 0; of those that differ as
+/// much, that of the least triangles comes first. How long their pieces are does not matter: that depends on
+/// how faces are cut into triangles.
 template <typename Team>
-TANDEM_HD_CALLED void NormalFinder<Team>::gather_longest(int side) {
-  FloatVector known[kMostDirections];
+TANDEM_HD_CALLED void NormalFinder<Team>::gather_unlike(int side, const Vector3& line, const Vector3& push) {
+  const FloatVector towards = rounded(push);
+  const auto least_along = static_cast<float>(kLeastAlong * dot(push, push));
+  FloatVector known[kMostDirections + 1] = {rounded(line)};
   int count = 0;
   for (; count < kMostDirections; ++count) {
-    float longest = -1;
+    float least = 2;
     LeastPiece own;
     for (std::uint32_t i = begin_ + team_.rank(); i < end_; i += team_.size()) {
       const std::uint32_t at = memory_.order[i];
-      const Piece& piece = memory_.pieces[at];
       const float* n = memory_.normals + 6 * std::size_t{at} + 3 * side;
       const FloatVector normal = {{n[0], n[1], n[2]}};
-      bool is_new = true;
-      for (int k = 0; k < count; ++k) is_new = is_new && !same_face(normal, known[k]);
+      bool is_new = dot(turned_normal(memory_.normals + 6 * std::size_t{at}, side), towards) >= least_along;
+      float alike = 0;
+      for (int k = 0; k <= count; ++k) {
+        const float along = std::fabs(dot(normal, known[k]));
+        alike = greater(along, alike);
+        is_new = is_new && (k == 0 || along < kSameLine);
+      }
       if (!is_new) continue;
-      const bool polygon = piece.kind() == MeetingKind::polygon;
-      // Lengths that differ by rounding are to be the same number.
-      const double length = polygon ? 0 : norm(piece.end[1] - piece.end[0]);
-      const float about = static_cast<float>(length + kAbout * length) - static_cast<float>(kAbout * length);
-      if (about > longest) longest = about, own = {};
-      if (about == longest) own.take(piece.key(), at);
+      // Directions that differ as much but for rounding are to have the same number.
+      const float about = (alike + kAbout) - kAbout;
+      if (about < least) least = about, own = {};
+      if (about == least) own.take(memory_.pieces[at].key(), at);
     }
-    if (team_.greatest(longest) != longest) own = {};
+    if (team_.least(least) != least) own = {};
     const std::uint64_t key = team_.least(own.key);
     if (key == ~std::uint64_t{0}) break;
     const std::uint32_t holder = team_.least(own.key == key ? own.piece : kNoIndex);
     const float* n = memory_.normals + 6 * std::size_t{holder} + 3 * side;
-    known[count] = {{n[0], n[1], n[2]}};
+    known[count + 1] = {{n[0], n[1], n[2]}};
     if (team_.rank() == 0) shared_.direction[directions_ + count] = {direction_of(side, holder), holder};
   }
   directions_ += count;
@@ -570,12 +601,15 @@ TANDEM_HD_CALLED void NormalFinder<Team>::gather_longest(int side) {
 template <typename Team>
 TANDEM_HD_CALLED int NormalFinder<Team>::gather_for_deep(const CurveMeasure& curve) {
   directions_ = 0;
-  gather_longest(0);
-  gather_longest(1);
   const Vector3 own = curve.by_area ? curve.area : curve.sheet_normal;
   const double size = norm(own);
   // Areas of two curves that cancel leave rounding.
   const bool counts = size > kLeastArea * curve.length * (curve.by_area ? curve.length : 1.0);
+  const bool joined = memory_.pieces[memory_.order[begin_]].joined != 0;
+  const bool both_ways = joined || summary_.degenerate || !counts || !curve.by_area;
+  const Vector3 line = longest_line(curve.middle), push = both_ways ? Vector3{} : (1 / size) * own;
+  gather_unlike(0, line, push);
+  gather_unlike(1, line, push);
   int count = 0;
   const auto add = [&](const Vector3& n) {
     bool is_new = true;
@@ -587,9 +621,31 @@ TANDEM_HD_CALLED int NormalFinder<Team>::gather_for_deep(const CurveMeasure& cur
     if (counts) add((1 / size) * own);
     for (int i = 0; i < directions_; ++i) add(shared_.direction[i].n);
     shared_.count = count;
+    shared_.both_ways = both_ways;
   }
   team_.sync();
   return shared_.count;
+}
+
+/// Returns the way from the middle of the pieces to the furthest of their ends.
+template <typename Team>
+TANDEM_HD_CALLED Vector3 NormalFinder<Team>::longest_line(const Vector3& middle) const {
+  const auto way = [&](const Piece& piece) {
+    const Vector3 p = piece.end[0] - middle, q = piece.end[1] - middle;
+    return piece.kind() == MeetingKind::polygon || dot(p, p) >= dot(q, q) ? p : q;
+  };
+  double most = -1;
+  LeastPiece own;
+  for (std::uint32_t i = begin_ + team_.rank(); i < end_; i += team_.size()) {
+    const std::uint32_t at = memory_.order[i];
+    const Vector3 from = way(memory_.pieces[at]);
+    if (dot(from, from) > most) most = dot(from, from), own = {};
+    if (dot(from, from) == most) own.take(memory_.pieces[at].key(), at);
+  }
+  if (team_.greatest(most) != most) own = {};
+  const std::uint64_t key = team_.least(own.key);
+  const Vector3 out = way(memory_.pieces[team_.least(own.key == key ? own.piece : kNoIndex)]);
+  return norm(out) > 0 ? normalized(out) : Vector3{0, 0, 1};
 }
 
 template <typename Team>
@@ -620,6 +676,8 @@ TANDEM_HD PatchNormal NormalFinder<Team>::find(const CurveMeasure& curve) {
   }
   out.kind = PatchKind::overlap;
   out.n = face_nearest(normalized(curve.by_area ? curve.area : curve.sheet_normal), curve.length);
+  // Triangles say along which face the overlap is removed the shortest way only where it is flat.
+  if (several_faces_ && height_along(out.n) > kNotFlat * reach_from(curve.middle)) out.kind = PatchKind::deep;
   // Where faces lie in each other, rounding may leave out a part of the curve, and the area tells nothing.
   if (summary_.degenerate && separation_along(out.n) > 2 * reach_from(curve.middle))
     out.kind = PatchKind::deep;

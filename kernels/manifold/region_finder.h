@@ -59,6 +59,13 @@ class RegionFinder {
     while (joined_to(curve) != curve) curve = joined_to(curve);
     return curve;
   }
+  /// The place of a curve that is nearest to the middle of all.
+  TANDEM_HD Place place_in(std::uint32_t curve) const {
+    const std::uint32_t piece = piece_of(curve);
+    return {CurvePlaces<Team>::nearest_on(memory_.pieces[piece], summary_.origin, kOffEnd * summary_.unit),
+            piece};
+  }
+  TANDEM_HD bool comes_first(std::uint32_t i, std::uint32_t than) const;
   TANDEM_HD std::uint32_t neighbour(std::uint32_t of, int k) const;
   TANDEM_HD bool is_joined(std::uint32_t i, std::uint32_t j);
   TANDEM_HD bool areas_agree(std::uint32_t first) const;
@@ -71,28 +78,30 @@ class RegionFinder {
   RegionMemory* shared_;
 };
 
-/// Tries lines from two pieces of the first curve, each to the nearest one of the second. They lead from
-/// beside a piece to beside another one.
+/// Tries lines from two places of the first curve, each to the nearest one of the second. They lead from
+/// beside a place to beside another one.
 template <typename Team>
 TANDEM_HD bool RegionFinder<Team>::is_joined(std::uint32_t i, std::uint32_t j) {
   const OverlapLines<Team> lines(team_, bodies_, memory_, shared_->lines);
-  const auto extreme = [&](std::uint32_t curve, std::uint32_t from, double sign) {
-    const Vector3 middle = memory_.pieces[from].middle();
-    return lines.extreme_piece(memory_.start[curve], memory_.start[curve + 1], &middle, 1, sign);
+  const CurvePlaces<Team> places(team_, memory_);
+  const auto nearest = [&](std::uint32_t curve, const Place& from) {
+    return places.nearest_place(memory_.start[curve], memory_.start[curve + 1], from.at, summary_.unit);
   };
   constexpr int kAttempts = 2;
-  const std::uint32_t first = piece_of(i);
-  std::uint32_t piece[2 * kAttempts];
+  const Place first = place_in(i);
+  Place place[2 * kAttempts];
   double most = 0;
   for (int k = 0; k < kAttempts; ++k) {
-    std::uint32_t* const ends = piece + 2 * k;
-    ends[0] = k == 0 ? extreme(i, extreme(j, first, 1), 1) : extreme(i, first, -1);
-    ends[1] = extreme(j, ends[0], 1);
-    const double apart = norm(memory_.pieces[ends[1]].middle() - memory_.pieces[ends[0]].middle());
-    most = greater(apart, most);
+    Place* const ends = place + 2 * k;
+    ends[0] = k == 0
+                  ? nearest(i, nearest(j, first))
+                  : places.furthest_place(memory_.start[i], memory_.start[i + 1], summary_.unit,
+                                          [&](const Vector3& x) { return dot(x - first.at, x - first.at); });
+    ends[1] = nearest(j, ends[0]);
+    most = greater(norm(ends[1].at - ends[0].at), most);
   }
   Vector3 inside[kAttempts][2];
-  const std::uint32_t found = lines.go_inside(piece, 2 * kAttempts, most, inside[0]);
+  const std::uint32_t found = lines.go_inside(place, 2 * kAttempts, most, inside[0]);
   int count = 0;
   for (int k = 0; k < kAttempts; ++k) {
     if ((found >> (2 * k) & 3u) != 3) continue;
@@ -172,30 +181,28 @@ TANDEM_HD std::uint32_t RegionFinder<Team>::sort_by_region() {
 template <typename Team>
 TANDEM_HD void RegionFinder<Team>::begin() {
   for (std::uint32_t c = 0; c < summary_.curves; ++c) {
-    LeastPiece own;
-    for (std::uint32_t i = memory_.start[c] + team_.rank(); i < memory_.start[c + 1]; i += team_.size())
-      own.take(memory_.pieces[memory_.order[i]].symmetric_key(), memory_.order[i]);
-    const std::uint64_t key = team_.least(own.key);
-    const std::uint32_t piece = team_.least(own.key == key ? own.piece : kNoIndex);
+    const Place place =
+        CurvePlaces<Team>(team_, memory_)
+            .nearest_place(memory_.start[c], memory_.start[c + 1], summary_.origin, summary_.unit);
     if (team_.rank() != 0) continue;
-    piece_of(c) = piece;
+    piece_of(c) = place.piece;
     partners_of(c, 0) = partners_of(c, 1) = 0;
   }
   team_.sync();
 }
 
-/// Returns the curve whose first piece is nearest to that of another one but for k; of equally near ones that
+/// Returns the curve whose place is nearest to that of another one but for k; of equally near ones that
 /// of the least triangles comes first. kNoIndex: there are not so many.
 template <typename Team>
 TANDEM_HD std::uint32_t RegionFinder<Team>::neighbour(std::uint32_t of, int k) const {
-  const Vector3 from = memory_.pieces[piece_of(of)].middle();
+  const Vector3 from = place_in(of).at;
   double last_distance = -1;
   std::uint64_t last_key = 0;
   for (;; --k) {
     double least = INFINITY;
     LeastPiece own;  // the piece is the curve here
     for (std::uint32_t j = team_.rank(); j < summary_.curves; j += team_.size()) {
-      const Vector3 apart = memory_.pieces[piece_of(j)].middle() - from;
+      const Vector3 apart = place_in(j).at - from;
       const double distance = dot(apart, apart);
       const std::uint64_t key = memory_.pieces[piece_of(j)].symmetric_key();
       const bool later = distance > last_distance || (distance == last_distance && key > last_key);
@@ -213,14 +220,22 @@ TANDEM_HD std::uint32_t RegionFinder<Team>::neighbour(std::uint32_t of, int k) c
   }
 }
 
+/// Returns whether a curve is nearer to the middle of all than another one; of equally near ones that of the
+/// least triangles comes first.
+template <typename Team>
+TANDEM_HD bool RegionFinder<Team>::comes_first(std::uint32_t i, std::uint32_t than) const {
+  const Vector3 p = place_in(i).at - summary_.origin, q = place_in(than).at - summary_.origin;
+  if (dot(p, p) != dot(q, q)) return dot(p, p) < dot(q, q);
+  return memory_.pieces[piece_of(i)].symmetric_key() < memory_.pieces[piece_of(than)].symmetric_key();
+}
+
 template <typename Team>
 TANDEM_HD void RegionFinder<Team>::try_to_join(std::uint32_t curve, int k) {
   if (static_cast<std::uint32_t>(k) + 1 >= summary_.curves) return;
   const std::uint32_t other = neighbour(curve, k);
   if (other == kNoIndex) return;
-  const auto key = [&](std::uint32_t c) { return memory_.pieces[piece_of(c)].symmetric_key(); };
   // Where all are each other's neighbours, the other way is tried as well.
-  if (summary_.curves <= kNeighbours + 1 && key(other) < key(curve)) return;
+  if (summary_.curves <= kNeighbours + 1 && comes_first(other, curve)) return;
   if (!is_joined(curve, other) || team_.rank() != 0) return;
   team_.set_bits(partners_of(curve, k / 4), (other + 1) << (8 * (k % 4)));
 }

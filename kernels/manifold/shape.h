@@ -20,6 +20,7 @@ inline Shape shape_of(const FileHeader& header, const LevelView& level) {
   shape.blocks = level.blocks;
   shape.oriented_blocks = level.oriented_blocks;
   set_bounds(header.lower, header.upper, header.origin, shape);
+  shape.triangle_count = level.triangle_count;
   shape.closed = level.closed;
   return shape;
 }

@@ -152,6 +152,33 @@ Mesh ring(int corners, double radius, int tube_corners, double tube_radius) {
   return mesh;
 }
 
+Mesh cup(int sectors, float radius, float height, float wall) {
+  const std::array<float, 2> profile[] = {
+      {0, 0}, {radius, 0}, {radius, height}, {radius - wall, height}, {radius - wall, wall}, {0, wall}};
+  Mesh mesh;
+  std::vector<std::vector<std::uint32_t>> ring;
+  for (const auto& [from_axis, z] : profile) {
+    ring.emplace_back();
+    if (from_axis == 0) {
+      ring.back().push_back(static_cast<std::uint32_t>(mesh.points.size()));
+      mesh.points.push_back({0, 0, z});
+      continue;
+    }
+    for (const auto& p : regular_polygon(sectors, from_axis)) {
+      ring.back().push_back(static_cast<std::uint32_t>(mesh.points.size()));
+      mesh.points.push_back(raised(p, z));
+    }
+  }
+  for (std::size_t k = 0; k + 1 < ring.size(); ++k) {
+    for (std::size_t i = 0; i < static_cast<std::size_t>(sectors); ++i) {
+      const auto at = [&](std::size_t of, std::size_t n) { return ring[of][n % ring[of].size()]; };
+      if (ring[k].size() > 1) mesh.triangles.push_back({at(k, i), at(k, i + 1), at(k + 1, i)});
+      if (ring[k + 1].size() > 1) mesh.triangles.push_back({at(k, i + 1), at(k + 1, i + 1), at(k + 1, i)});
+    }
+  }
+  return mesh;
+}
+
 Mesh joined(const Mesh& a, const Mesh& b) {
   Mesh mesh = a;
   const auto base = static_cast<std::uint32_t>(a.points.size());

@@ -34,6 +34,9 @@ Mesh pipe(int corners, double inner_radius, double outer_radius, float height);
 /// A ring about the z axis: a tube of regular polygons around a regular polygon of this radius.
 Mesh ring(int corners, double radius, int tube_corners, double tube_radius);
 
+/// A cup that stands on z = 0: a profile that is turned about the z axis.
+Mesh cup(int sectors, float radius, float height, float wall);
+
 /// Both meshes in one.
 Mesh joined(const Mesh& a, const Mesh& b);
 Mesh moved(Mesh mesh, float x, float y, float z);

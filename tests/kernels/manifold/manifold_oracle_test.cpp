@@ -137,25 +137,6 @@ class ConvexPair {
   std::vector<Axis> axes_;
 };
 
-/// Returns how far a point is from the surface of a convex body.
-double off_surface(const Mesh& mesh, const Vector3& x) {
-  double out = INFINITY;
-  for (const auto& t : mesh.triangles) {
-    const auto corner = [&](std::size_t k) {
-      const auto& p = mesh.points[t[k]];
-      return Vector3{p[0], p[1], p[2]};
-    };
-    const Vector3 p = corner(0), q = corner(1), r = corner(2), n = normalized(cross(q - p, r - p));
-    double outside = 0;
-    for (int k = 0; k < 3; ++k) {
-      const Vector3 &from = k == 0 ? p : k == 1 ? q : r, &to = k == 0 ? q : k == 1 ? r : p;
-      outside = std::max(outside, dot(normalized(cross(to - from, n)), x - from));
-    }
-    out = std::min(out, std::max(std::fabs(dot(n, x - p)), outside));
-  }
-  return out;
-}
-
 bool is_real(const Manifold& m) {
   return (m.flags & kAmbiguous) == 0;
 }
@@ -189,8 +170,8 @@ TEST_P(ConvexManifolds, AreOneForEveryOverlapAndItsDepthPartsTheBodies) {
       EXPECT_GT(m.depth, (1 - 1e-5) * depth - 1e-8) << m.flags;
       EXPECT_NEAR(scene.points_of(m)[0].depth, m.depth, 1e-9 * m.depth);
       for (const ManifoldPoint& p : scene.points_of(m)) {
-        EXPECT_LT(off_surface(GetParam().mesh, vector_of(p.in_a)), 1e-8);
-        EXPECT_LT(off_surface(other.mesh, vector_of(p.in_b)), 1e-8);
+        EXPECT_LT(off_surface(triangles_of(GetParam().mesh, kIdentityPose), vector_of(p.in_a)), 1e-8);
+        EXPECT_LT(off_surface(triangles_of(other.mesh, kIdentityPose), vector_of(p.in_b)), 1e-8);
       }
       const Pose motion = any_motion(random, 1);
       scene.find(motion);
@@ -209,6 +190,28 @@ TEST_P(ConvexManifolds, AreOneForEveryOverlapAndItsDepthPartsTheBodies) {
 
 INSTANTIATE_TEST_SUITE_P(Bodies, ConvexManifolds, testing::ValuesIn(convex_bodies()),
                          [](const auto& tested) { return std::string(tested.param.name); });
+
+/// Spheres of triangles are polyhedra: a corner pushes along the face that it is in, which leans, since that
+/// parts them soonest.
+TEST(Spheres, ThatOverlapALittlePushAlongTheAxisThatPartsThemSoonest) {
+  RandomPoses random(33);
+  const Mesh mesh = sphere(0.5, 2);
+  const Axes axes(mesh);
+  ManifoldScene scene;
+  scene.add_body(scene.add_shape(mesh), kIdentityPose);
+  scene.add_body(0, kIdentityPose);
+  for (int trial = 0; trial < trials(60, 20); ++trial) {
+    const double overlap = trial % 2 == 0 ? 5e-5 : 5e-4;
+    scene.bodies[0].pose = any_motion(random, 0);
+    Pose pose = after(shift(0, 0, 0.9), any_motion(random, 0));
+    const double apart = ConvexPair(axes, scene.bodies[0].pose, axes, pose).along({0, 0, 1});
+    scene.bodies[1].pose = pose = after(shift(0, 0, apart - overlap), pose);
+    scene.find();
+    ASSERT_EQ(scene.manifolds().size(), 1u);
+    const double least = ConvexPair(axes, scene.bodies[0].pose, axes, pose).least();
+    EXPECT_LT(scene.manifolds()[0].depth, (trial % 2 == 0 ? 1.001 : 1.01) * least);
+  }
+}
 
 /// Bodies of bulges and hollows: b stays in contact until it has moved by the depth.
 TEST(AnyBodies, DoNotPartBeforeOneHasMovedByTheDepth) {
@@ -248,7 +251,7 @@ TEST(AnyBodies, DoNotPartBeforeOneHasMovedByTheDepth) {
     }
   }
   EXPECT_GT(seen, 200);
-  EXPECT_GT(parted, seen * 3 / 5);
+  EXPECT_GT(parted, seen * 7 / 10);
 }
 
 /// The tubes of two links are saddles where they meet: neither lies behind the planes of its triangles.
@@ -342,31 +345,11 @@ TEST(Overlap, OfThinTetrahedraIsNotLost) {
   EXPECT_GT(scene.manifolds()[0].depth, 0);
 }
 
-/// A cup by a profile that is turned, and a ball in it whose lowest point is about as deep as its floor is
+/// A cup, and a ball in it whose lowest point is about as deep as its floor is
 /// thick: which way is shorter is a matter of the floor, not of where the cup's middle is.
 TEST(Overlap, OfABallWithTheFloorOfACupIsUndoneUpwards) {
-  constexpr int kSectors = 32;
-  const float profile[][2] = {{0, 0}, {.1f, 0}, {.1f, .2f}, {.09f, .2f}, {.09f, .01f}, {0, .01f}};
-  Mesh cup;
-  std::vector<std::vector<std::uint32_t>> ring;
-  for (const auto& [radius, height] : profile) {
-    ring.emplace_back();
-    for (int i = 0; i < (radius > 0 ? kSectors : 1); ++i) {
-      const double angle = 2 * 3.14159265358979323846 * i / kSectors;
-      ring.back().push_back(static_cast<std::uint32_t>(cup.points.size()));
-      cup.points.push_back({static_cast<float>(radius * std::cos(angle)),
-                            static_cast<float>(radius * std::sin(angle)), height});
-    }
-  }
-  for (std::size_t k = 0; k + 1 < ring.size(); ++k) {
-    for (std::size_t i = 0; i < kSectors; ++i) {
-      const auto at = [&](std::size_t of, std::size_t n) { return ring[of][n % ring[of].size()]; };
-      if (ring[k].size() > 1) cup.triangles.push_back({at(k, i), at(k, i + 1), at(k + 1, i)});
-      if (ring[k + 1].size() > 1) cup.triangles.push_back({at(k, i + 1), at(k + 1, i + 1), at(k + 1, i)});
-    }
-  }
   ManifoldScene scene;
-  scene.add_body(scene.add_shape(cup), kIdentityPose);
+  scene.add_body(scene.add_shape(cup(32, 0.1f, 0.2f, 0.01f)), kIdentityPose);
   scene.add_body(scene.add_shape(sphere(0.04, 2)), kIdentityPose);
   for (const double z : {.041, .0395, .036, .030}) {
     SCOPED_TRACE(z);

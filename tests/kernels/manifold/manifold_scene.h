@@ -112,6 +112,21 @@ inline Triangles triangles_of(const Mesh& mesh, const Pose& pose) {
   return out;
 }
 
+/// Returns how far a point is from a surface, or from the planes and edges of its nearest triangle.
+inline double off_surface(const Triangles& surface, const Vector3& x) {
+  double out = INFINITY;
+  for (const auto& [p, q, r] : surface) {
+    const Vector3 n = normalized(cross(q - p, r - p));
+    double outside = 0;
+    for (int k = 0; k < 3; ++k) {
+      const Vector3 &from = k == 0 ? p : k == 1 ? q : r, &to = k == 0 ? q : k == 1 ? r : p;
+      outside = std::max(outside, dot(normalized(cross(to - from, n)), x - from));
+    }
+    out = std::min(out, std::max(std::fabs(dot(n, x - p)), outside));
+  }
+  return out;
+}
+
 /// A part of a surface: its area vector, and the sum of area vectors times middles.
 struct SurfacePart {
   Vector3 area;

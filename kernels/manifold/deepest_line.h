@@ -276,9 +276,8 @@ TANDEM_HD_CALLED bool DeepestLine<Team>::look_around(const Vector3& middle, doub
   team_.sync();  // all have read the best line
   if (team_.rank() == 0 && best >= 0) {
     Seeds& seeds = shared_.seeds;
-    const int last = kMostSeeds - 1, at = seeds.count <= last    ? seeds.count++
-                                          : shared_.from == last ? last - 1
-                                                                 : last;
+    int at = shared_.from == kMostSeeds - 1 ? kMostSeeds - 2 : kMostSeeds - 1;
+    if (seeds.count < kMostSeeds) at = seeds.count++;
     seeds.at[at] = deepest, seeds.beside[at] = place[best].piece;
   }
   team_.sync();

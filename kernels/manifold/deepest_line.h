@@ -236,14 +236,10 @@ TANDEM_HD_CALLED bool DeepestLine<Team>::goes_on_elsewhere() const {
 /// what is opposite within both bodies. True if one is deeper than the best line: its point becomes a seed.
 template <typename Team>
 TANDEM_HD_CALLED bool DeepestLine<Team>::look_around(const Vector3& middle, double reach) {
-  constexpr int kPlaces = 8, kPoints = 4;
+  constexpr int kPlaces = 8, kPoints = 2;
   const OverlapLines<Team> lines(team_, bodies_, memory_, shared_.lines);
   const CurvePlaces<Team> places(team_, memory_);
   const Vector3 n = shared_.frame.n;
-  const auto furthest_along = [&](const Vector3& direction) {
-    return places.furthest_place(begin_, end_, reach,
-                                 [&](const Vector3& x) { return dot(x - middle, direction); });
-  };
   Vector3 along =
       places
           .furthest_place(begin_, end_, reach, [&](const Vector3& x) { return dot(x - middle, x - middle); })
@@ -252,12 +248,14 @@ TANDEM_HD_CALLED bool DeepestLine<Team>::look_around(const Vector3& middle, doub
   along = along - dot(along, n) * n;
   const Vector3 across = cross(n, along);
   Place place[kPlaces];
-  Vector3 inside[kPlaces], point[kPlaces], deepest;
+  Vector3 inside[kPlaces], point[kPlaces], deepest, direction[kPlaces];
   constexpr int kStep[kPlaces] = {1, 1, 0, -1, -1, -1, 0, 1};  // eighths of a turn
   for (int i = 0; i < kPlaces; ++i) {
     const double x = kStep[i], y = kStep[(i + 6) % kPlaces];
-    place[i] = furthest_along(x * along + y * across);
+    direction[i] = x * along + y * across;
   }
+  const auto height = [&](int i, const Vector3& x) { return dot(x - middle, direction[i]); };
+  places.furthest_places(begin_, end_, reach, height, place);
   const double most = greater(bodies_.a.shape->diagonal, bodies_.b.shape->diagonal);
   const std::uint32_t found = lines.go_inside(place, kPlaces, most, inside);
   double most_depth = shared_.best.depth();
@@ -266,7 +264,7 @@ TANDEM_HD_CALLED bool DeepestLine<Team>::look_around(const Vector3& middle, doub
     int count = 0, from[kPlaces];
     for (int i = 0; i < kPlaces; ++i) {
       if ((found >> i & 1u) == 0) continue;
-      point[count] = place[i].at + (0.1 + 0.6 * k) * (inside[i] - place[i].at);
+      point[count] = place[i].at + (0.4 + 0.8 * k) * (inside[i] - place[i].at);
       from[count++] = i;
     }
     double depth;

@@ -26,35 +26,54 @@ class CurvePlaces {
  public:
   TANDEM_HD CurvePlaces(const Team& team, const PieceMemory& memory) : team_(team), memory_(memory) {}
 
-  /// Returns the place that is nearest to a point. reach: of the
-  /// pieces.
+  /// Returns the place that is nearest to a point. reach: of the pieces.
   TANDEM_HD Place nearest_place(std::uint32_t begin, std::uint32_t end, const Vector3& from,
                                 double reach) const {
-    return least_place(begin, end, [&](const Piece& piece, Vector3& at) {
-      at = nearest_on(piece, from, kOffEnd * reach);
-      return dot(at - from, at - from);
+    Place out[1];
+    least_places(begin, end, out, [&](const Piece& piece, Vector3(&at)[1], double(&value)[1]) {
+      at[0] = nearest_on(piece, from, kOffEnd * reach);
+      value[0] = dot(at[0] - from, at[0] - from);
     });
+    return out[0];
   }
   /// Returns the place that has most of a convex function. That is an end of a piece, and none between pieces
   /// into which a straight one is cut.
   template <typename Value>
   TANDEM_HD Place furthest_place(std::uint32_t begin, std::uint32_t end, double reach,
                                  const Value& value) const {
-    return least_place(begin, end, [&](const Piece& piece, Vector3& at) {
-      const Vector3 p = nearest_on(piece, piece.end[0], kOffEnd * reach),
-                    q = nearest_on(piece, piece.end[1], kOffEnd * reach);
-      const double of_p = value(p), of_q = value(q);
-      at = of_p >= of_q ? p : q;
-      return -greater(of_p, of_q);
+    Place out[1];
+    furthest_places(
+        begin, end, reach, [&](int, const Vector3& x) { return value(x); }, out);
+    return out[0];
+  }
+  /// Finds those that have most of several such functions: value(i, x).
+  template <int kCount, typename Value>
+  TANDEM_HD void furthest_places(std::uint32_t begin, std::uint32_t end, double reach, const Value& value,
+                                 Place (&out)[kCount]) const {
+    least_places(begin, end, out, [&](const Piece& piece, Vector3(&at)[kCount], double(&least)[kCount]) {
+      Vector3 p = piece.end[0], q = p;
+      if (piece.kind() != MeetingKind::polygon) {
+        const Vector3 along = piece.end[1] - p;
+        const double length = norm(along), off_end = kOffEnd * reach;
+        const Vector3 off = (length > 2 * off_end ? off_end / length : 0.5) * along;
+        q = piece.end[1] - off, p = p + off;
+      }
+      for (int i = 0; i < kCount; ++i) {
+        const double of_p = value(i, p), of_q = value(i, q);
+        at[i] = of_p >= of_q ? p : q;
+        least[i] = -greater(of_p, of_q);
+      }
     });
   }
   /// Returns the point of a piece that is nearest to another one and not too near to its ends.
   TANDEM_HD static Vector3 nearest_on(const Piece& piece, const Vector3& from, double off_end);
 
  private:
-  /// Returns the place of the least value; of several that of the least triangles.
-  template <typename ValueOf>
-  TANDEM_HD Place least_place(std::uint32_t begin, std::uint32_t end, const ValueOf& value_of) const;
+  /// Finds the places of least values; of several that of the least triangles. values_of(piece, at, value):
+  /// where each is on the piece, and how much.
+  template <int kCount, typename ValuesOf>
+  TANDEM_HD void least_places(std::uint32_t begin, std::uint32_t end, Place (&out)[kCount],
+                              const ValuesOf& values_of) const;
 
   const Team& team_;
   const PieceMemory& memory_;
@@ -117,24 +136,37 @@ TANDEM_HD Vector3 CurvePlaces<Team>::nearest_on(const Piece& piece, const Vector
 }
 
 template <typename Team>
-template <typename ValueOf>
-TANDEM_HD Place CurvePlaces<Team>::least_place(std::uint32_t begin, std::uint32_t end,
-                                               const ValueOf& value_of) const {
-  double least = INFINITY;
-  LeastPiece own;
-  Vector3 at;
+template <int kCount, typename ValuesOf>
+TANDEM_HD void CurvePlaces<Team>::least_places(std::uint32_t begin, std::uint32_t end, Place (&out)[kCount],
+                                               const ValuesOf& values_of) const {
+  double least[kCount], value[kCount];
+  LeastPiece own[kCount];
+  Vector3 at[kCount];
+  for (double& of : least) of = INFINITY;
   for (std::uint32_t i = begin + team_.rank(); i < end; i += team_.size()) {
-    const double value = value_of(memory_.pieces[memory_.order[i]], at);
-    if (value < least) least = value, own = {};
-    if (value == least) own.take(memory_.pieces[memory_.order[i]].symmetric_key(), memory_.order[i]);
+    const std::uint32_t piece = memory_.order[i];
+    values_of(memory_.pieces[piece], at, value);
+    for (int k = 0; k < kCount; ++k) {
+      if (value[k] > least[k]) continue;
+      if (value[k] < least[k]) least[k] = value[k], own[k] = {};
+      own[k].take(memory_.pieces[piece].symmetric_key(), piece);
+    }
   }
-  const double least_of_all = team_.least(least);
-  if (least != least_of_all) own = {};
-  const std::uint64_t key = team_.least(own.key);
-  Place out;
-  out.piece = team_.least(own.key == key ? own.piece : kNoIndex);
-  value_of(memory_.pieces[out.piece], out.at);
-  return out;
+  std::uint64_t key[kCount];
+  std::uint32_t piece[kCount];
+  for (int k = 0; k < kCount; ++k) value[k] = least[k];
+  team_.least_ones(least);
+  for (int k = 0; k < kCount; ++k) {
+    if (value[k] != least[k]) own[k] = {};
+    key[k] = own[k].key;
+  }
+  team_.least_ones(key);
+  for (int k = 0; k < kCount; ++k) piece[k] = own[k].key == key[k] ? own[k].piece : kNoIndex;
+  team_.least_ones(piece);
+  for (int k = 0; k < kCount; ++k) {
+    values_of(memory_.pieces[piece[k]], at, value);
+    out[k] = {at[k], piece[k]};
+  }
 }
 
 template <typename Team>

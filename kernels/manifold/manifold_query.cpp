@@ -85,7 +85,7 @@ struct ManifoldQuery::State : Allocated {
   Status name_shapes(SceneState& scene);
   Status check_bodies(SceneState& scene) const;
   Status check(SceneState& scene, std::span<const ObjectPair> pairs, std::span<const Contact> contacts) const;
-  Status check_kept(SceneState& scene, const Asked& asked) const;
+  Status check_kept(SceneState& scene, const Asked& asked, bool on_device) const;
   Status group(SceneState& scene, std::size_t pairs, std::span<const Contact>& contacts);
   void name_pairs(const MovedQuery* moved);
   void make_patches(std::size_t from, std::size_t to, std::uint32_t worker, const SceneState& scene,
@@ -300,10 +300,10 @@ bool ManifoldQuery::State::remember_step(std::span<const ObjectPair> pairs) {
   return true;
 }
 
-// What is kept is what the call before found.
-Status ManifoldQuery::State::check_kept(SceneState& scene, const Asked& asked) const {
+// What is kept is what the call before found. The device knows by itself what it found.
+Status ManifoldQuery::State::check_kept(SceneState& scene, const Asked& asked, bool on_device) const {
   if (asked.moved == nullptr) return Status::kOk;
-  const bool is_kept = asked.moved->counters().kept != 0;
+  const bool is_kept = asked.moved->counters().kept != 0 && !on_device;
   const bool is_known = !is_kept || (moved_call != 0 && moved_call == asked.moved->call_before());
   const bool is_asked = std::ranges::equal(asked.pairs, asked.moved->rows());
   return is_known && is_asked && asked.moved->is_of(scene) ? Status::kOk : scene.fail(Status::kKeptMismatch, 0);
@@ -382,12 +382,13 @@ Status ManifoldQuery::ask(Scene& in, const Asked& asked, const ManifoldOptions& 
     std::swap(state->found, state->found_before);
     status = check_most_points(options.most_points);
     status = status == Status::kOk ? state->name_shapes(*scene) : scene->fail(status, 0);
-    if (status == Status::kOk) status = state->check_kept(*scene, asked);
+    if (status == Status::kOk) status = state->check_kept(*scene, asked, on_device != nullptr);
     if (status == Status::kOk)
       status = scene->take_pairs(asked.moved != nullptr ? asked.moved->pairs() : asked.pairs, pairs_);
     if (status == Status::kOk) status = state->check_bodies(*scene);
     if (status == Status::kOk) {
-      status = on_device != nullptr ? scene->ask_device(options, *on_device, points_, found())
+      if (on_device != nullptr) state->moved_call = 0;
+      status = on_device != nullptr ? scene->ask_device(options, asked.moved, *on_device, points_, found())
                                     : answer(*scene, *state, asked, options);
     }
   }

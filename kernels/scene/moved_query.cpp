@@ -4,6 +4,7 @@
 #include <atomic>
 
 #include "kernels/geometry/pair_motion.h"
+#include "kernels/scene/moved_call.h"
 #include "kernels/scene/scene_state.h"
 
 namespace tandem {
@@ -11,11 +12,6 @@ namespace {
 
 // Pairs that a thread decides at a time.
 constexpr std::size_t kPairsAtOnce = 256;
-
-std::uint64_t next_call() {
-  static std::atomic<std::uint64_t> last = 0;
-  return ++last;
-}
 
 // The place of a pair in the list of the call before.
 struct PairPlace {
@@ -28,6 +24,11 @@ struct PairPlace {
 };
 
 }  // namespace
+
+std::uint64_t take_moved_calls(std::uint64_t count) {
+  static std::atomic<std::uint64_t> next = 1;
+  return next.fetch_add(count);
+}
 
 struct MovedQuery::State : Allocated {
   std::uint64_t assets_id = 0;  // whose boxes these are, and what is kept is of
@@ -67,25 +68,28 @@ bool MovedQuery::State::place_before() {
   return true;
 }
 
-// Lists of successive calls are nearly the same, so a pair is mostly found behind the one before it.
+// Lists of successive calls are nearly the same, so a pair is mostly found behind the one before it. Of equal
+// pairs before, the first is found.
 void MovedQuery::State::decide(std::size_t from, std::size_t to, const SceneState& scene,
                                std::span<const ObjectPair> pairs, const MovedOptions& options,
                                std::uint32_t* kept_rows, PosedBodies* posed) const {
-  const PairPlace *next = places_before.data(), *const begin = next, *const end = begin + places_before.size();
+  const PairPlace *const begin = places_before.data(), *const end = begin + places_before.size(), *next = end;
   for (std::size_t i = from; i < to; ++i) {
-    const PairPlace wanted = {pairs[i], 0};
-    if (next == end || !(next->pair == wanted.pair)) next = std::lower_bound(begin, end, wanted);
+    const auto is_first = [&] {
+      return next != end && next->pair == pairs[i] && (next == begin || !(next[-1].pair == pairs[i]));
+    };
+    if (!is_first()) next = std::lower_bound(begin, end, PairPlace{pairs[i], 0});
     kept_rows[i] = kNoIndex;
     posed[i] = {pairs[i], scene.instances[pairs[i].a], scene.instances[pairs[i].b]};
-    if (next == end || !(next->pair == wanted.pair)) continue;
-    const PosedBodies &before = posed_before[next->row], now = posed[i];
-    ++next;
+    if (!is_first()) continue;
+    const PairPlace& place = *next++;
+    const PosedBodies &before = posed_before[place.row], now = posed[i];
     if (before.a.asset != now.a.asset || before.b.asset != now.b.asset) continue;
     const double tolerance = options.tolerance_of_pair.empty() ? options.tolerance : options.tolerance_of_pair[i];
     if (!is_kept(boxes[now.a.asset], boxes[now.b.asset], {before.a.pose, before.b.pose},
                  {now.a.pose, now.b.pose}, tolerance))
       continue;
-    kept_rows[i] = (next - 1)->row;
+    kept_rows[i] = place.row;
     posed[i] = before;
   }
 }
@@ -131,7 +135,7 @@ Status MovedQuery::decide(SceneState& scene, State& state, const MovedOptions& o
   (void)rows_.resize(moved);
   counters_ = {pairs.size(), pairs.size() - moved};
   call_before_ = call_;
-  call_ = next_call();
+  call_ = take_moved_calls(1);
   state.version = scene.version;
   return Status::kOk;
 }

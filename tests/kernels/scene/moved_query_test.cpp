@@ -278,7 +278,7 @@ TEST(MovedQuery, ThreadsDoNotChangeIt) {
   ASSERT_EQ(many.scene.set_threads(7), Status::kOk);
   for (int step = 0; step < 4; ++step) {
     for (std::size_t i = 0; i < one.bodies.size(); ++i) {
-      one.bodies[i].pose.translation[2] += random.symmetric(0.0005);
+      one.bodies[i].pose.translation[2] += random.symmetric(0.0008);
       many.bodies[i].pose = one.bodies[i].pose;
     }
     const Pairs rows = one.rows(kTolerant);

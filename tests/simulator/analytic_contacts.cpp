@@ -3,6 +3,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "kernels/geometry/pair_motion.h"
 
@@ -103,17 +104,15 @@ class BallsOnPlane : public AnalyticContacts {
 std::vector<ObjectPair> PairJudge::kept(std::span<const ObjectPair> pairs, std::span<const BodyPose> bodies,
                                         std::span<const double> radii, double tolerance) {
   std::vector<ObjectPair> kept;
-  const auto before = std::exchange(found_at_, {});
+  const std::vector<PosedBodies> before = std::exchange(posed_, {});
   for (const ObjectPair& pair : pairs) {
-    const Pose now[] = {bodies[pair.a].pose, bodies[pair.b].pose};
-    const auto found = before.find(pair);
-    const auto stays = [&] {
-      const Pose then[] = {found->second[0], found->second[1]};
-      return is_kept(cube_of(radii[pair.a]), cube_of(radii[pair.b]), then, now, tolerance);
-    };
-    const bool is_kept = found != before.end() && stays();
-    if (is_kept) kept.push_back(pair);
-    found_at_[pair] = is_kept ? found->second : std::array{now[0], now[1]};
+    const PosedBodies now = {pair, bodies[pair.a], bodies[pair.b]};
+    const auto then = std::ranges::lower_bound(before, pair, {}, &PosedBodies::pair);
+    const bool stays = then != before.end() && then->pair == pair &&
+                       is_kept(cube_of(radii[pair.a]), cube_of(radii[pair.b]), {then->a.pose, then->b.pose},
+                               {now.a.pose, now.b.pose}, tolerance);
+    if (stays) kept.push_back(pair);
+    posed_.push_back(stays ? *then : now);
   }
   return kept;
 }

@@ -1,7 +1,6 @@
 #pragma once
-#include <array>
-#include <map>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "bvhbench/simulator/simulator.h"
@@ -25,13 +24,16 @@ BodyProperties fixed_body();
 /// Judges whether pairs have moved, of bodies whose bounds are cubes about the origin of their frame.
 class PairJudge {
  public:
-  /// Returns which of these pairs are kept, and takes the others as found now. Condition: a radius for each
-  /// body, that of its bounds.
+  /// Returns which of these pairs are kept, and takes the others as found now. Conditions: a radius for
+  /// each body, that of its bounds; pairs are ascending.
   std::vector<ObjectPair> kept(std::span<const ObjectPair> pairs, std::span<const BodyPose> bodies,
                                std::span<const double> radii, double tolerance);
 
+  std::span<const PosedBodies> posed() const { return posed_; }
+  void resume(std::span<const PosedBodies> posed) { posed_.assign(posed.begin(), posed.end()); }
+
  private:
-  std::map<ObjectPair, std::array<Pose, 2>> found_at_;
+  std::vector<PosedBodies> posed_;  // by ascending pair
 };
 
 /// Contacts by formula, which pairs keep.
@@ -39,8 +41,8 @@ class AnalyticContacts : public ContactFinder {
  public:
   const std::vector<ContactPoint>& find(std::span<const BodyPose> bodies, std::span<const std::uint8_t> idle,
                                         const Keeping& keeping) final;
-  std::span<const PosedBodies> posed() const final { return {}; }
-  void resume(std::span<const PosedBodies>) final { judge_ = {}; }
+  std::span<const PosedBodies> posed() const final { return judge_.posed(); }
+  void resume(std::span<const PosedBodies> posed) final { judge_.resume(posed); }
 
  protected:
   /// Finds the contacts of all pairs.

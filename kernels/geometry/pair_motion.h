@@ -82,9 +82,10 @@ struct SmallerInLarger {
 /// rotation is at most 1.000001 long.
 /// - An entry of M or N is off by at most 3.01 u, as the lengths of two columns bound the products; an entry
 ///   of N - M, at most 2.01 large, by 8.1 u. An entry of m, n is off by 5.1 u times its part of t.
-/// - So the first term of a row is off by 8.1 sqrt(3) u c + 4.1 u (2.01 sqrt(3) c + 1.01 t) + 6.2 u t <= u (29
-///   c + 12 t), the second by 8.1 sqrt(3) u h + 4.1 u 2.01 sqrt(3) h <= 29 u h. The roundings of their sum, of
-///   squares and of the root are at most 6 u of the result.
+/// - So the first term of a row is off by 8.1 sqrt(3) u c + 4.1 u (2.01 sqrt(3) c + 1.01 t) + 6.2 u t <= u
+/// (29
+///   c + 12 t), the second by 8.1 sqrt(3) u h + 4.1 u 2.01 sqrt(3) h <= 29 u h. The roundings of their sum,
+///   of squares and of the root are at most 6 u of the result.
 /// - A query poses points in float64: a coordinate errs by 4.01 u (1.01 (c + h) + the translation), and so a
 ///   point by 7.1 u (c + h + t), then and now.
 /// Three rows make sqrt(3) as much as one: u (sqrt(3) (29 c + 29 h + 12 t) + 14.2 (c + h + t)) < 2^-46 (c + h
@@ -116,13 +117,13 @@ TANDEM_HD inline bool second_is_larger(const AssetBox& a, const AssetBox& b) {
 
 /// The rule: whether a pair is taken as it was found, given where its bodies stood then and stand now, in the
 /// coordinates of their files. Nothing is kept by a tolerance of 0.
-TANDEM_HD inline bool is_kept(const AssetBox& a, const AssetBox& b, const Pose (&then)[2], const Pose (&now)[2],
-                              double tolerance) {
+TANDEM_HD inline bool is_kept(const AssetBox& a, const AssetBox& b, const Pose (&then)[2],
+                              const Pose (&now)[2], double tolerance) {
   if (!(tolerance > 0)) return false;
   const bool b_larger = second_is_larger(a, b);
   const AssetBox &larger = b_larger ? b : a, &smaller = b_larger ? a : b;
   const int l = b_larger ? 1 : 0, s = 1 - l;
-  const auto stored = [&](const Pose (&poses)[2]) {
+  const auto stored = [&](const Pose(&poses)[2]) {
     return PosedPair{for_stored_coordinates(poses[l], larger.origin),
                      for_stored_coordinates(poses[s], smaller.origin)};
   };

@@ -70,14 +70,15 @@ __global__ void __launch_bounds__(kThreads) count_kept(const __grid_constant__ M
 }
 
 /// Moves the manifolds of a pair: all lanes of a group, a point each.
-__device__ void move_pair(const ManifoldArgs& args, std::uint32_t pair, std::uint32_t row, std::uint32_t lane) {
+__device__ void move_pair(const ManifoldArgs& args, std::uint32_t pair, std::uint32_t row,
+                          std::uint32_t lane) {
   const PairPlace place = args.places[pair], before = args.places_before[row];
   if (place.manifolds == 0) return;
   const PosedBodies& then = args.moved.posed[pair];
   const AssetBox *a = &args.moved.boxes[then.a.asset], *b = &args.moved.boxes[then.b.asset];
-  const manifold::KeptMotion motion(
-      {then.a.pose, then.b.pose},
-      {args.instances.pose[then.pair.a], args.instances.pose[then.pair.b]}, second_is_larger(*a, *b));
+  const manifold::KeptMotion motion({then.a.pose, then.b.pose},
+                                    {args.instances.pose[then.pair.a], args.instances.pose[then.pair.b]},
+                                    second_is_larger(*a, *b));
   for (std::uint32_t i = 0; i < place.manifolds; ++i) {
     const std::uint32_t to = place.first_manifold + i, from = before.first_manifold + i;
     const FoundManifold of_then = args.found_manifolds_before[from];

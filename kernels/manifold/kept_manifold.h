@@ -67,7 +67,9 @@ class KeptMotion {
 
  private:
   TANDEM_HD static Vector3 of(const double (&x)[3]) { return {x[0], x[1], x[2]}; }
-  TANDEM_HD static void write(const Vector3& x, double (&out)[3]) { out[0] = x.x, out[1] = x.y, out[2] = x.z; }
+  TANDEM_HD static void write(const Vector3& x, double (&out)[3]) {
+    out[0] = x.x, out[1] = x.y, out[2] = x.z;
+  }
   TANDEM_HD static Vector3 posed(const Pose& pose, const Vector3& x) {
     double out[3];
     apply(pose, x.x, x.y, x.z, out);

@@ -93,9 +93,9 @@ struct ManifoldArgs {
   GpuContactGroups groups;
   const GpuContactReport* query;
   GpuManifoldCapacity capacity;
-  GpuMoved moved;        ///< `pairs` are those that have moved; null: they are all
-  bool match_previous;   ///< the call before is remembered
-  bool matches;          ///< points are looked for in it
+  GpuMoved moved;       ///< `pairs` are those that have moved; null: they are all
+  bool match_previous;  ///< the call before is remembered
+  bool matches;         ///< points are looked for in it
   int most_points;
 
   ManifoldState* state;
@@ -114,7 +114,7 @@ struct ManifoldArgs {
   ManifoldPoint* points;
   PairEntry* entries;  ///< of each manifold: the first of a pair has the pair's points, others none
 
-  PairPlace *places, *places_before;  ///< of all pairs
+  PairPlace *places, *places_before;                                  ///< of all pairs
   manifold::FoundManifold *found_manifolds, *found_manifolds_before;  ///< of each manifold
   manifold::FoundPoint *found_points, *found_points_before;           ///< of each point
 
@@ -171,8 +171,8 @@ cudaError_t move_entries(const TableEntry* from, std::uint32_t from_size, TableE
 /// The next call finds nothing before it.
 cudaError_t forget_last(ManifoldState* state, cudaStream_t stream);
 
-/// Keeps what the last call found, to be moved; counts what is kept of it; moves it. They do nothing where all
-/// pairs are asked about.
+/// Keeps what the last call found, to be moved; counts what is kept of it; moves it. They do nothing where
+/// all pairs are asked about.
 cudaError_t remember_kept(const ManifoldArgs& args, cudaStream_t stream);
 cudaError_t count_kept_manifolds(const ManifoldArgs& args, cudaStream_t stream);
 cudaError_t move_kept_manifolds(const ManifoldArgs& args, cudaStream_t stream);

@@ -148,7 +148,8 @@ Status ManifoldQuery::State::group(SceneState& scene, std::size_t pairs, std::sp
   }
   rows.clear();
   for (std::size_t i = 0; i < pairs; ++i) {
-    if (begin[i + 1] > 0 && !rows.push({static_cast<std::uint32_t>(i), static_cast<std::uint32_t>(i), 0, 0, 0, 0}))
+    if (begin[i + 1] > 0 &&
+        !rows.push({static_cast<std::uint32_t>(i), static_cast<std::uint32_t>(i), 0, 0, 0, 0}))
       return scene.fail(Status::kOutOfMemory, 0);
     if (begin[i + 1] > manifold::kMostContactsOfPair) return scene.fail(Status::kOutOfRange, i);
     begin[i + 1] += begin[i];
@@ -210,7 +211,8 @@ Status ManifoldQuery::State::place_pairs(SceneState& scene, std::size_t pairs, c
   }
   std::uint64_t next_manifold = 0, next_point = 0;
   for (std::size_t i = 0; i < pairs; ++i) {
-    if (moved != nullptr && moved->kept_rows()[i] != kNoIndex) places[i] = places_before[moved->kept_rows()[i]];
+    if (moved != nullptr && moved->kept_rows()[i] != kNoIndex)
+      places[i] = places_before[moved->kept_rows()[i]];
     places[i].first_manifold = static_cast<std::uint32_t>(next_manifold);
     places[i].first_point = static_cast<std::uint32_t>(next_point);
     next_manifold += places[i].manifolds;
@@ -223,8 +225,8 @@ Status ManifoldQuery::State::place_pairs(SceneState& scene, std::size_t pairs, c
   return has_memory ? Status::kOk : scene.fail(Status::kOutOfMemory, 0);
 }
 
-void ManifoldQuery::State::finish(const Row& row, const SceneState& scene, const ObjectPair& pair, bool remember,
-                                  Rows out, bool match) {
+void ManifoldQuery::State::finish(const Row& row, const SceneState& scene, const ObjectPair& pair,
+                                  bool remember, Rows out, bool match) {
   Patch* const patches = workers[row.worker].made.patches.data() + row.first_patch;
   std::sort(patches, patches + row.patches, [](const Patch& x, const Patch& y) { return x.key < y.key; });
   const PairPlace& place = places[row.pair];
@@ -258,8 +260,8 @@ void ManifoldQuery::State::finish(const Row& row, const SceneState& scene, const
 }
 
 // Moves the manifolds of a pair that is kept.
-void ManifoldQuery::State::keep(std::uint32_t pair, const SceneState& scene, const MovedQuery& moved, Rows out,
-                                bool match) {
+void ManifoldQuery::State::keep(std::uint32_t pair, const SceneState& scene, const MovedQuery& moved,
+                                Rows out, bool match) {
   const PairPlace &place = places[pair], &before = places_before[moved.kept_rows()[pair]];
   if (place.manifolds == 0) return;
   const PosedBodies& then = moved.posed()[pair];
@@ -291,7 +293,8 @@ bool ManifoldQuery::State::remember_step(std::span<const ObjectPair> pairs) {
   pair_points_before.clear();
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     if (places[i].points == 0) continue;
-    if (!pair_points_before.push({bodies_of(pairs[i]), places[i].first_point, places[i].points})) return false;
+    if (!pair_points_before.push({bodies_of(pairs[i]), places[i].first_point, places[i].points}))
+      return false;
   }
   std::sort(pair_points_before.data(), pair_points_before.data() + pair_points_before.size(),
             [](const PairPoints& x, const PairPoints& y) {
@@ -306,7 +309,8 @@ Status ManifoldQuery::State::check_kept(SceneState& scene, const Asked& asked, b
   const bool is_kept = asked.moved->counters().kept != 0 && !on_device;
   const bool is_known = !is_kept || (moved_call != 0 && moved_call == asked.moved->call_before());
   const bool is_asked = std::ranges::equal(asked.pairs, asked.moved->rows());
-  return is_known && is_asked && asked.moved->is_of(scene) ? Status::kOk : scene.fail(Status::kKeptMismatch, 0);
+  return is_known && is_asked && asked.moved->is_of(scene) ? Status::kOk
+                                                           : scene.fail(Status::kKeptMismatch, 0);
 }
 
 Status ManifoldQuery::answer(SceneState& scene, State& state, const Asked& asked,
@@ -337,25 +341,23 @@ Status ManifoldQuery::answer(SceneState& scene, State& state, const Asked& asked
   }
   const State::Rows out = {rows_, points_};
   if ((status = state.place_pairs(scene, pairs.size(), moved, out)) != Status::kOk) return status;
-  scene.threads.for_parts(workers, state.rows.size(), kRowsAtOnce,
-                          [&](std::size_t from, std::size_t to, std::uint32_t) {
-                            for (std::size_t i = from; i < to; ++i) {
-                              const Row& row = state.rows[i];
-                              state.finish(row, scene, pairs[row.pair], moved != nullptr, out,
-                                           options.match_previous);
-                            }
-                          });
+  scene.threads.for_parts(
+      workers, state.rows.size(), kRowsAtOnce, [&](std::size_t from, std::size_t to, std::uint32_t) {
+        for (std::size_t i = from; i < to; ++i) {
+          const Row& row = state.rows[i];
+          state.finish(row, scene, pairs[row.pair], moved != nullptr, out, options.match_previous);
+        }
+      });
   if (moved != nullptr) {
     const std::uint32_t of_pairs = scene.workers_for(pairs.size(), kPairsAtOnce);
     if (!scene.threads.provide(of_pairs)) return scene.fail(Status::kCannotStartThread, 0);
-    scene.threads.for_parts(of_pairs, pairs.size(), kPairsAtOnce,
-                            [&](std::size_t from, std::size_t to, std::uint32_t) {
-                              for (std::size_t i = from; i < to; ++i) {
-                                if (moved->kept_rows()[i] != kNoIndex)
-                                  state.keep(static_cast<std::uint32_t>(i), scene, *moved, out,
-                                             options.match_previous);
-                              }
-                            });
+    scene.threads.for_parts(
+        of_pairs, pairs.size(), kPairsAtOnce, [&](std::size_t from, std::size_t to, std::uint32_t) {
+          for (std::size_t i = from; i < to; ++i) {
+            if (moved->kept_rows()[i] != kNoIndex)
+              state.keep(static_cast<std::uint32_t>(i), scene, *moved, out, options.match_previous);
+          }
+        });
   }
   counters_.contacts = contacts.size();
   counters_.manifolds = rows_.size();
@@ -374,7 +376,8 @@ Status ManifoldQuery::ask(Scene& in, const Asked& asked, const ManifoldOptions& 
   State* const state = state_.provide();
   Status status = Status::kOutOfMemory;
   if (scene != nullptr && state != nullptr) {
-    const DeviceMemory* const on_device = asked.query != nullptr ? asked.query->on_device_of(*scene) : nullptr;
+    const DeviceMemory* const on_device =
+        asked.query != nullptr ? asked.query->on_device_of(*scene) : nullptr;
     if (!options.match_previous || on_device != nullptr) state->pair_points_before.clear();
     std::swap(rows_, state->manifolds_before);
     std::swap(points_, state->points_before);

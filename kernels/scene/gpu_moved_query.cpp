@@ -22,7 +22,8 @@ struct HostOf<GpuMovedReport> : GpuHost<MovedState, GpuMovedReport> {
   ArgArray<&MovedArgs::moved_rows> moved_rows{of_pairs};
   ArgArray<&MovedArgs::row_of_moved> row_of_moved{of_pairs};
   ArgArray<&MovedArgs::moved> moved{of_pairs};
-  ArgArray<&MovedArgs::tile_sums> tile_sums{of_pairs, [](std::uint64_t count) { return count / kMovedTile + 1; }};
+  ArgArray<&MovedArgs::tile_sums> tile_sums{of_pairs,
+                                            [](std::uint64_t count) { return count / kMovedTile + 1; }};
   ArgArray<&MovedArgs::table> table{of_pairs, [](std::uint64_t count) { return 2 * count + 32; }};
 
   GpuMovedCapacity capacity() const { return {of_pairs.count()}; }
@@ -85,8 +86,8 @@ Status GpuMovedQuery::enqueue(const GpuInstances& instances, const GpuPairs& pai
   return host.keep(gpu::queue(args, stream, gpu::remember_poses, gpu::find_moved));
 }
 
-Status GpuMovedQuery::find(const GpuInstances& instances, const GpuPairs& pairs, const GpuMovedOptions& options,
-                           cudaStream_t stream) {
+Status GpuMovedQuery::find(const GpuInstances& instances, const GpuPairs& pairs,
+                           const GpuMovedOptions& options, cudaStream_t stream) {
   GpuMovedCapacity first = capacity();
   first.pairs = std::max(first.pairs, pairs.capacity);
   return gpu::find_until_complete(

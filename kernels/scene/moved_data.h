@@ -21,9 +21,9 @@ struct MovedState {
   std::uint32_t tiles_taken, finished_blocks;
 
   // These are kept from call to call.
-  std::uint32_t step;         ///< of the table
-  std::uint32_t has_last;     ///< the last call is the one before the next
-  std::uint32_t last_pairs;   ///< of the last call
+  std::uint32_t step;          ///< of the table
+  std::uint32_t has_last;      ///< the last call is the one before the next
+  std::uint32_t last_pairs;    ///< of the last call
   std::uint32_t pairs_before;  ///< in posed_before
   std::uint64_t call_before;   ///< that posed_before is of
   std::uint64_t next_call;

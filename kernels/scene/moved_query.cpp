@@ -85,7 +85,8 @@ void MovedQuery::State::decide(std::size_t from, std::size_t to, const SceneStat
     const PairPlace& place = *next++;
     const PosedBodies &before = posed_before[place.row], now = posed[i];
     if (before.a.asset != now.a.asset || before.b.asset != now.b.asset) continue;
-    const double tolerance = options.tolerance_of_pair.empty() ? options.tolerance : options.tolerance_of_pair[i];
+    const double tolerance =
+        options.tolerance_of_pair.empty() ? options.tolerance : options.tolerance_of_pair[i];
     if (!is_kept(boxes[now.a.asset], boxes[now.b.asset], {before.a.pose, before.b.pose},
                  {now.a.pose, now.b.pose}, tolerance))
       continue;

@@ -174,9 +174,10 @@ static void test_bad_options(tandem_asset* cube) {
   CHECK_STATUS(tandem_scene_find_manifolds(scene, &kept), TANDEM_BAD_OPTION);
   kept.keep = 1;
   CHECK_STATUS(tandem_scene_find_manifolds(scene, &kept), TANDEM_CONTACTS_MISSING);
-  tandem_moved_options moved = {sizeof moved, 0, 0, NULL, 1, NULL, 0};
+  const double tolerances[2] = {0, 0};
+  tandem_moved_options moved = {sizeof moved, 0, 0, NULL, 2, NULL, 0};
   CHECK_STATUS(tandem_scene_find_moved(scene, &moved), TANDEM_NULL_ARGUMENT);
-  moved.tolerance_of_pair = &moved.tolerance;
+  moved.tolerance_of_pair = tolerances;
   CHECK_STATUS(tandem_scene_find_moved(scene, &moved), TANDEM_BAD_OPTION);
   moved.tolerance_count = 0;
   moved.reserved = 1;

@@ -47,7 +47,8 @@ class BoxesOnPlane : public AnalyticContacts {
  private:
   void find_all(std::span<const BodyPose> bodies, std::vector<ContactPoint>& points) override {
     for (std::uint32_t i = 1; i < bodies.size(); ++i) on_plane(i, bodies[i].pose, points);
-    for (std::uint32_t i = 1; i + 1 < bodies.size(); ++i) on_box(i, bodies[i].pose, bodies[i + 1].pose, points);
+    for (std::uint32_t i = 1; i + 1 < bodies.size(); ++i)
+      on_box(i, bodies[i].pose, bodies[i + 1].pose, points);
     for (ContactPoint& point : points) point.depth += flicker_ * static_cast<double>(++calls_ % 3);
   }
   double radius(std::uint32_t body) const override { return body == 0 ? kWide : half_.norm(); }

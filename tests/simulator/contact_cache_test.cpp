@@ -216,7 +216,8 @@ TEST(WarmStart, ImpulsesFollowFeaturesThenPlacesAndTheRestIsSharedOut) {
   EXPECT_EQ(matched[3].normal, 2);
 }
 
-// Contacts whose depths jump by up to 0.8 mm, found anew in each step, keep a block moving at 0.04 to 0.2 m/s.
+// Contacts whose depths jump by up to 0.8 mm, found anew in each step, keep a block moving at 0.04 to 0.2
+// m/s.
 TEST(ContactCache, ContactsThatFlickerDoNotShakeABlock) {
   for (const SolverKind solver :
        {SolverKind::automatic, SolverKind::soft, SolverKind::newton, SolverKind::sweeps}) {

@@ -231,9 +231,10 @@ ExitCode run(const char* kind, SimulateArguments arguments, const SetUp& set_up)
   std::unique_ptr<ContinuousMotion> continuous;
   if (arguments.continuous)
     continuous = std::make_unique<ContinuousMotion>(start.shapes(), options.threads, start.filter);
-  Simulator simulator(start.bodies.bodies, start.bodies.states,
-                      make_mesh_contact_finder(std::move(engine), start.shapes(), options.threads, arguments.ask_all), options,
-                      std::move(continuous));
+  Simulator simulator(
+      start.bodies.bodies, start.bodies.states,
+      make_mesh_contact_finder(std::move(engine), start.shapes(), options.threads, arguments.ask_all),
+      options, std::move(continuous));
   const RunResults results = run_simulation(simulator, description, start.reentry, arguments.run);
   print(arguments, report_of(kind, arguments, description, results));
   return kDone;

@@ -47,8 +47,8 @@ const Row* result(std::span<const Found> found, size_t* count) {
   return reinterpret_cast<const Row*>(found.empty() ? nullptr : found.data());
 }
 
-/// The options of manifolds, on the CPU or on a GPU. keep: null where pairs cannot be kept. Result: TANDEM_OK,
-/// TANDEM_BAD_STRUCT_SIZE or TANDEM_BAD_OPTION.
+/// The options of manifolds, on the CPU or on a GPU. keep: null where pairs cannot be kept. Result:
+/// TANDEM_OK, TANDEM_BAD_STRUCT_SIZE or TANDEM_BAD_OPTION.
 template <typename Options>
 tandem_status read_manifold_options(const tandem_manifold_options* given, Options& options,
                                     bool* keep = nullptr) {

@@ -225,8 +225,9 @@ tandem_status find_manifolds(tandem_scene& self, const tandem_manifold_options* 
   const tandem_status status = read_manifold_options(given, options, &keep);
   if (status != TANDEM_OK) return status;
   if (self.standing == Standing::none || (keep && !self.moved.found)) return TANDEM_CONTACTS_MISSING;
-  return self.told(keep ? self.manifolds.query.find(self.scene, self.moved.query, self.contacts.query, options)
-                        : self.manifolds.query.find(self.scene, self.contacts.query, options));
+  return self.told(keep
+                       ? self.manifolds.query.find(self.scene, self.moved.query, self.contacts.query, options)
+                       : self.manifolds.query.find(self.scene, self.contacts.query, options));
 }
 
 template <typename Query>

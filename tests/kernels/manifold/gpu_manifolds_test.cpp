@@ -273,7 +273,8 @@ TEST_F(GpuManifolds, HaveFromOneToSevenPoints) {
 /// Both sides of a scene whose manifolds are kept.
 class KeptOnBothSides {
  public:
-  explicit KeptOnBothSides(const test::SampleAssets& assets) : uploaded_(assets, {}, {}, Contents::manifolds) {
+  explicit KeptOnBothSides(const test::SampleAssets& assets)
+      : uploaded_(assets, {}, {}, Contents::manifolds) {
     EXPECT_EQ(scene_.set_assets(assets.views()), Status::kOk);
     EXPECT_EQ(gpu_moved_.set_assets(uploaded_.assets(), nullptr), Status::kOk);
     EXPECT_EQ(gpu_query_.set_assets(uploaded_.assets(), nullptr), Status::kOk);
@@ -409,8 +410,9 @@ TEST_F(GpuManifolds, ThatAreKeptByAGraphThatIsReplayed) {
     EXPECT_EQ(both.gpu_moved().enqueue(on_gpu.instances(), on_gpu.pairs(), {.tolerance = 1}, stream.get()),
               Status::kOk);
     const GpuMoved moved = both.gpu_moved().moved();
-    EXPECT_EQ(both.gpu_query().enqueue(on_gpu.instances(), moved.moved, test::grouped_options(), stream.get()),
-              Status::kOk);
+    EXPECT_EQ(
+        both.gpu_query().enqueue(on_gpu.instances(), moved.moved, test::grouped_options(), stream.get()),
+        Status::kOk);
     return both.gpu().enqueue(on_gpu.instances(), moved, both.gpu_query(), {}, stream.get());
   });
   for (int step = 0; step < 3; ++step) {
@@ -431,16 +433,19 @@ TEST_F(GpuManifolds, ThatTheCallBeforeDidNotReturnAreRefused) {
   const GpuScene on_gpu(std::span<const AssetView>(), scene.instances, pairs);
   const auto status = [&] {
     const GpuMoved moved = both.gpu_moved().moved();
-    EXPECT_EQ(both.gpu_query().find_contacts(on_gpu.instances(), moved.moved, test::grouped_options(), nullptr),
-              Status::kOk);
+    EXPECT_EQ(
+        both.gpu_query().find_contacts(on_gpu.instances(), moved.moved, test::grouped_options(), nullptr),
+        Status::kOk);
     return both.gpu().make(on_gpu.instances(), moved, both.gpu_query(), {}, nullptr);
   };
   for (int call = 0; call < 2; ++call) {  // of one of them there are no manifolds
-    EXPECT_EQ(both.gpu_moved().find(on_gpu.instances(), on_gpu.pairs(), {.tolerance = 1}, nullptr), Status::kOk);
+    EXPECT_EQ(both.gpu_moved().find(on_gpu.instances(), on_gpu.pairs(), {.tolerance = 1}, nullptr),
+              Status::kOk);
   }
   EXPECT_EQ(status(), Status::kKeptMismatch);
   EXPECT_EQ(both.gpu_moved().forget_poses(nullptr), Status::kOk);
-  EXPECT_EQ(both.gpu_moved().find(on_gpu.instances(), on_gpu.pairs(), {.tolerance = 1}, nullptr), Status::kOk);
+  EXPECT_EQ(both.gpu_moved().find(on_gpu.instances(), on_gpu.pairs(), {.tolerance = 1}, nullptr),
+            Status::kOk);
   EXPECT_EQ(both.gpu_moved().report().counters.kept, 0u);
   EXPECT_EQ(status(), Status::kOk);
   EXPECT_EQ(both.gpu_moved().find(on_gpu.instances(), on_gpu.pairs(), {.tolerance = -1}, nullptr),

@@ -86,8 +86,9 @@ TEST(PairMotion, NoPointOfTheSmallerBodyGoesFarther) {
     const double far = std::pow(10, random.uniform(-6, 9)), size = std::sqrt(corners.box().squared);
     const double deviation = random.below(2) == 0 ? 0 : 3e-7;
     const double turn = random.below(6) == 0 ? 0 : std::pow(10, random.uniform(-17, 0.5));
-    const double way = random.below(6) == 0 ? 0 : (size + far * (random.below(4) == 0)) *
-                                                      std::pow(10, random.uniform(-17, 0));
+    const double way = random.below(6) == 0
+                           ? 0
+                           : (size + far * (random.below(4) == 0)) * std::pow(10, random.uniform(-17, 0));
     const PosedPair then = {random.pose({.translation = far, .deviation = deviation}),
                             random.pose({.translation = far, .deviation = deviation})};
     PosedPair now = then;
@@ -218,7 +219,8 @@ TEST(MovedQuery, APairThatLeftTheListIsARowWhenItComesBack) {
 TEST(MovedQuery, EachPairMayHaveItsOwnTolerance) {
   Row row;
   row.rows(kTolerant);
-  for (Instance& body : row.bodies) body.pose.translation[1] += 1e-4 * static_cast<double>(&body - row.bodies.data());
+  for (Instance& body : row.bodies)
+    body.pose.translation[1] += 1e-4 * static_cast<double>(&body - row.bodies.data());
   const std::vector<double> tolerance = {1, 0, 1e-5, 1e-3, 2e-4};
   EXPECT_EQ(row.rows({.tolerance_of_pair = tolerance}), (Pairs{{1, 2}, {2, 3}}));
   EXPECT_EQ(row.find({.tolerance_of_pair = std::span(tolerance).first(4)}), Status::kBadOption);

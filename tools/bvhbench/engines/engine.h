@@ -214,8 +214,8 @@ class Engine {
 
   /// Finds what a simulator asks for: update(), find_pairs(), query() and contacts(), in the order of a
   /// ContactList. `idle`: empty, or for each body whether it does not move (1; else 0): pairs of two idle
-  /// bodies are not found. They take the place of the filter's motions. `choose`: null for all pairs; the time
-  /// that it takes counts as the broad phase's.
+  /// bodies are not found. They take the place of the filter's motions. `choose`: null for all pairs; the
+  /// time that it takes counts as the broad phase's.
   void find(std::span<const BodyPose> bodies, std::span<const std::uint8_t> idle, ContactList& found,
             const PairChoice& choose = nullptr);
 

@@ -16,22 +16,23 @@ struct CachedContact {
   std::uint64_t feature;
   ContactAnchor anchor;
   Eigen::Vector3d normal_in_a;  ///< the normal, in a's frame
-  std::uint32_t quiet_steps;  ///< since it was found or last pushed
-  ContactImpulse impulse;     ///< of the last step
+  std::uint32_t quiet_steps;    ///< since it was found or last pushed
+  ContactImpulse impulse;       ///< of the last step
 };
 
-/// Remembers the contacts of a step and their impulses. Pairs that have not moved keep their contacts: contacts of meshes change with every triangle that comes or goes, and found anew in
-/// each step they would shake what rests. The others start from the impulses of the step before.
+/// Remembers the contacts of a step and their impulses. Pairs that have not moved keep their contacts:
+/// contacts of meshes change with every triangle that comes or goes, and found anew in each step they would
+/// shake what rests. The others start from the impulses of the step before.
 class ContactCache {
  public:
   /// Returns the pairs whose contacts are remembered, ascending.
   std::vector<ObjectPair> pairs() const;
 
-  /// Makes the contacts of a step. Pairs that are kept have those remembered, moved with the bodies; these may have
-  /// become gaps. All others have those found, and those just lost: remembered ones that are gaps of at most
-  /// `gap` along the normal, slid by at most a fiftieth of the smaller body's radius, with no other contact
-  /// of the pair that near, for at most eight steps since they pushed. Without these a body that comes off by
-  /// a hair falls freely for a whole step, and deeper than it was.
+  /// Makes the contacts of a step. Pairs that are kept have those remembered, moved with the bodies; these
+  /// may have become gaps. All others have those found, and those just lost: remembered ones that are gaps of
+  /// at most `gap` along the normal, slid by at most a fiftieth of the smaller body's radius, with no other
+  /// contact of the pair that near, for at most eight steps since they pushed. Without these a body that
+  /// comes off by a hair falls freely for a whole step, and deeper than it was.
   ///
   /// These contacts start with the impulse of the remembered one of the pair that has the same feature, or
   /// else of the nearest one within a tenth of the smaller body's radius; each is given once. What then is

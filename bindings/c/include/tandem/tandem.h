@@ -468,10 +468,10 @@ typedef struct tandem_moved_counters {
   uint64_t object_pairs, kept;
 } tandem_moved_counters;
 
-/// Finds the pairs that have moved by more than the tolerance since they last were rows, or were not among the
-/// pairs of the call before. Contacts need only be asked of these: the manifolds of the others can be kept
-/// (tandem_manifold_options::keep). Result: TANDEM_BAD_TOLERANCE where a tolerance is negative or NaN, and
-/// `where` is the pair; TANDEM_BAD_OPTION where there are not as many as pairs.
+/// Finds the pairs that have moved by more than the tolerance since they last were rows, or were not among
+/// the pairs of the call before. Contacts need only be asked of these: the manifolds of the others can be
+/// kept (tandem_manifold_options::keep). Result: TANDEM_BAD_TOLERANCE where a tolerance is negative or NaN,
+/// and `where` is the pair; TANDEM_BAD_OPTION where there are not as many as pairs.
 TANDEM_API tandem_status tandem_scene_find_moved(tandem_scene* scene, const tandem_moved_options* options);
 /// Returns the pairs that have moved, in the order of the question's pairs.
 TANDEM_API const tandem_object_pair* tandem_scene_moved(const tandem_scene* scene, size_t* count);
@@ -523,8 +523,8 @@ typedef struct tandem_manifold_options {
   uint32_t struct_size;
   uint32_t most_points;      ///< of a manifold, 1 to 7, else TANDEM_BAD_OPTION; 0: 7
   uint32_t ignore_previous;  ///< 1: points are not looked for among those of the last call
-  uint32_t keep;  ///< 1: the contacts are those of tandem_scene_moved(); manifolds of pairs that have not moved
-                  ///< are the ones that were found, moved with the bodies (docs/contacts.md), and
+  uint32_t keep;  ///< 1: the contacts are those of tandem_scene_moved(); manifolds of pairs that have not
+                  ///< moved are the ones that were found, moved with the bodies (docs/contacts.md), and
                   ///< tandem_manifold::pair is a row of the pairs of TANDEM_MOVED
 } tandem_manifold_options;
 

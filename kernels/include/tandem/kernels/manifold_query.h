@@ -39,10 +39,10 @@ class ManifoldQuery : public Answer<Manifold, ManifoldCounters> {
   /// name these.
   ///
   /// A kept manifold is that of the pose where it was found, moved with the bodies: normal and area_vector
-  /// turn with the larger body, in_a and in_b stay, position and centre go the mean way of the two bodies, and
-  /// depths are measured anew between in_a and in_b, less than 0 where the bodies have come apart. Flags, ids
-  /// and the number and order of points stay. Where neither body has moved, all bytes but indices do. A kept
-  /// pair without manifolds still has none.
+  /// turn with the larger body, in_a and in_b stay, position and centre go the mean way of the two bodies,
+  /// and depths are measured anew between in_a and in_b, less than 0 where the bodies have come apart. Flags,
+  /// ids and the number and order of points stay. Where neither body has moved, all bytes but indices do. A
+  /// kept pair without manifolds still has none.
   ///
   /// Result: as above, where where() counts rows of `moved`; also kKeptMismatch: the scene does not stand as
   /// it did for `moved`, the contacts are not of its rows, or pairs are kept whose manifolds the call before

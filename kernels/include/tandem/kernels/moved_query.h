@@ -32,10 +32,10 @@ struct MovedCounters {
 /// bodies is of another asset. The others are kept: what was found of them is that of the poses where they
 /// were rows. ManifoldQuery keeps their manifolds.
 ///
-/// The motion is bounded from above (kernels/geometry/pair_motion.h), rounding included, so a pair may be a row
-/// although it has moved by a little less. Result of find(): kOk; kBadTolerance, where where() of the scene is
-/// the pair that has it; kBadOption; or as of ContactQuery. After an error, and of other assets, nothing is
-/// kept.
+/// The motion is bounded from above (kernels/geometry/pair_motion.h), rounding included, so a pair may be a
+/// row although it has moved by a little less. Result of find(): kOk; kBadTolerance, where where() of the
+/// scene is the pair that has it; kBadOption; or as of ContactQuery. After an error, and of other assets,
+/// nothing is kept.
 class MovedQuery : public PairQuestion<MovedQuery, ObjectPair, MovedCounters, MovedOptions> {
  public:
   /// Returns for each of pairs() its row among the pairs of the call before, if it is kept, or kNoIndex.

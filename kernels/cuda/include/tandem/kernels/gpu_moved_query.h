@@ -58,8 +58,8 @@ extern template class GpuAssetQuestion<GpuMovedCapacity, GpuMovedReport>;
 
 /// Finds the object pairs that have moved, on the GPU: what MovedQuery finds. See GpuQuestion.
 ///
-/// Assets are the list that instances refer to; set_assets() forgets the last call, reserve() does not. bytes()
-/// is at most most_moved_bytes().
+/// Assets are the list that instances refer to; set_assets() forgets the last call, reserve() does not.
+/// bytes() is at most most_moved_bytes().
 class GpuMovedQuery : public GpuAssetQuestion<GpuMovedCapacity, GpuMovedReport> {
  public:
   /// Queues the search behind what `stream` holds. Result: also kBadTolerance. Condition: set_assets() and

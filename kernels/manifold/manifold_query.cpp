@@ -306,11 +306,12 @@ bool ManifoldQuery::State::remember_step(std::span<const ObjectPair> pairs) {
 // What is kept is what the call before found. The device knows by itself what it found.
 Status ManifoldQuery::State::check_kept(SceneState& scene, const Asked& asked, bool on_device) const {
   if (asked.moved == nullptr) return Status::kOk;
-  const bool is_kept = asked.moved->counters().kept != 0 && !on_device;
-  const bool is_known = !is_kept || (moved_call != 0 && moved_call == asked.moved->call_before());
-  const bool is_asked = std::ranges::equal(asked.pairs, asked.moved->rows());
-  return is_known && is_asked && asked.moved->is_of(scene) ? Status::kOk
-                                                           : scene.fail(Status::kKeptMismatch, 0);
+  const MovedQuery& moved = *asked.moved;
+  const bool stands = moved.call() != 0 && moved.is_of(scene);
+  const bool is_known = on_device || moved.counters().kept == 0 ||
+                        (moved_call != 0 && moved_call == moved.call_before());
+  const bool fits = stands && is_known && std::ranges::equal(asked.pairs, moved.rows());
+  return fits ? Status::kOk : scene.fail(Status::kKeptMismatch, 0);
 }
 
 Status ManifoldQuery::answer(SceneState& scene, State& state, const Asked& asked,

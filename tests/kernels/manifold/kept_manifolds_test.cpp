@@ -337,6 +337,8 @@ TEST(KeptManifolds, ThatTheCallBeforeDidNotReturnAreRefused) {
   ManifoldQuery other;
   EXPECT_TRUE(refused(other));
   heap.moved.forget_poses();
+  EXPECT_TRUE(refused(heap.made));
+  EXPECT_EQ(other.find(heap.scene, MovedQuery(), heap.contacts), Status::kKeptMismatch);
   heap.find(0.01);
   heap.find(0.01);
   ASSERT_EQ(heap.moved.find(heap.scene, {.tolerance = 0.01}), Status::kOk);  // a call is left out

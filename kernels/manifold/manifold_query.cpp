@@ -23,7 +23,7 @@ using manifold::Shape;
 constexpr std::size_t kRowsAtOnce = 16;
 
 // Pairs whose manifolds a thread keeps at a time.
-constexpr std::size_t kPairsAtOnce = 256;
+constexpr std::size_t kKeptAtOnce = 256;
 
 // A pair that has contacts, and where its patches lie.
 struct Row {
@@ -350,10 +350,10 @@ Status ManifoldQuery::answer(SceneState& scene, State& state, const Asked& asked
         }
       });
   if (moved != nullptr) {
-    const std::uint32_t of_pairs = scene.workers_for(pairs.size(), kPairsAtOnce);
+    const std::uint32_t of_pairs = scene.workers_for(pairs.size(), kKeptAtOnce);
     if (!scene.threads.provide(of_pairs)) return scene.fail(Status::kCannotStartThread, 0);
     scene.threads.for_parts(
-        of_pairs, pairs.size(), kPairsAtOnce, [&](std::size_t from, std::size_t to, std::uint32_t) {
+        of_pairs, pairs.size(), kKeptAtOnce, [&](std::size_t from, std::size_t to, std::uint32_t) {
           for (std::size_t i = from; i < to; ++i) {
             if (moved->kept_rows()[i] != kNoIndex)
               state.keep(static_cast<std::uint32_t>(i), scene, *moved, out, options.match_previous);

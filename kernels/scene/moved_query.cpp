@@ -11,14 +11,14 @@ namespace tandem {
 namespace {
 
 // Pairs that a thread decides at a time.
-constexpr std::size_t kPairsAtOnce = 256;
+constexpr std::size_t kDecidedAtOnce = 256;
 
 // The place of a pair in the list of the call before.
-struct PairPlace {
+struct PairRow {
   ObjectPair pair;
   std::uint32_t row;
 
-  friend bool operator<(const PairPlace& x, const PairPlace& y) {
+  friend bool operator<(const PairRow& x, const PairRow& y) {
     return x.pair != y.pair ? x.pair < y.pair : x.row < y.row;
   }
 };
@@ -35,7 +35,7 @@ struct MovedQuery::State : Allocated {
   std::uint64_t version = 0;    // of the scene in the last call
   Buffer<AssetBox> boxes;
   Buffer<PosedBodies> posed_before;
-  Buffer<PairPlace> places_before;  // sorted
+  Buffer<PairRow> places_before;  // sorted
 
   bool box_assets(const SceneState& scene);
   bool place_before();
@@ -73,16 +73,16 @@ bool MovedQuery::State::place_before() {
 void MovedQuery::State::decide(std::size_t from, std::size_t to, const SceneState& scene,
                                std::span<const ObjectPair> pairs, const MovedOptions& options,
                                std::uint32_t* kept_rows, PosedBodies* posed) const {
-  const PairPlace *const begin = places_before.data(), *const end = begin + places_before.size(), *next = end;
+  const PairRow *const begin = places_before.data(), *const end = begin + places_before.size(), *next = end;
   for (std::size_t i = from; i < to; ++i) {
     const auto is_first = [&] {
       return next != end && next->pair == pairs[i] && (next == begin || !(next[-1].pair == pairs[i]));
     };
-    if (!is_first()) next = std::lower_bound(begin, end, PairPlace{pairs[i], 0});
+    if (!is_first()) next = std::lower_bound(begin, end, PairRow{pairs[i], 0});
     kept_rows[i] = kNoIndex;
     posed[i] = {pairs[i], scene.instances[pairs[i].a], scene.instances[pairs[i].b]};
     if (!is_first()) continue;
-    const PairPlace& place = *next++;
+    const PairRow& place = *next++;
     const PosedBodies &before = posed_before[place.row], now = posed[i];
     if (before.a.asset != now.a.asset || before.b.asset != now.b.asset) continue;
     const double tolerance =
@@ -122,9 +122,9 @@ Status MovedQuery::decide(SceneState& scene, State& state, const MovedOptions& o
   if (!state.box_assets(scene) || !state.place_before() || !kept_rows_.resize(pairs.size()) ||
       !posed_.resize(pairs.size()) || !rows_.resize(pairs.size()))
     return scene.fail(Status::kOutOfMemory, 0);
-  const std::uint32_t workers = scene.workers_for(pairs.size(), kPairsAtOnce);
+  const std::uint32_t workers = scene.workers_for(pairs.size(), kDecidedAtOnce);
   if (!scene.threads.provide(workers)) return scene.fail(Status::kCannotStartThread, 0);
-  scene.threads.for_parts(workers, pairs.size(), kPairsAtOnce,
+  scene.threads.for_parts(workers, pairs.size(), kDecidedAtOnce,
                           [&](std::size_t from, std::size_t to, std::uint32_t) {
                             state.decide(from, to, scene, pairs, options, kept_rows_.data(), posed_.data());
                           });

@@ -308,8 +308,8 @@ Status ManifoldQuery::State::check_kept(SceneState& scene, const Asked& asked, b
   if (asked.moved == nullptr) return Status::kOk;
   const MovedQuery& moved = *asked.moved;
   const bool stands = moved.call() != 0 && moved.is_of(scene);
-  const bool is_known = on_device || moved.counters().kept == 0 ||
-                        (moved_call != 0 && moved_call == moved.call_before());
+  const bool is_known =
+      on_device || moved.counters().kept == 0 || (moved_call != 0 && moved_call == moved.call_before());
   const bool fits = stands && is_known && std::ranges::equal(asked.pairs, moved.rows());
   return fits ? Status::kOk : scene.fail(Status::kKeptMismatch, 0);
 }

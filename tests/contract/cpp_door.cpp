@@ -72,7 +72,8 @@ class CppDoor final : public Door {
       found.rows.resize(found.pairs.size());
       return found;
     }
-    if (question == "moved") return about_pairs(moved_, options, {.tolerance = number(options, "tolerance", 0)});
+    if (question == "moved")
+      return about_pairs(moved_, options, {.tolerance = number(options, "tolerance", 0)});
     if (question == "contacts") return contacts(options);
     if (question == "manifolds") return manifolds(options);
     if (question == "contained") return shown(contained_, contained_.find(*scene_, contacts_));

@@ -130,7 +130,7 @@ Json object_of(const Row& row) {
   TANDEM_FIELD(at_start) TANDEM_FIELD(found) TANDEM_FIELD(apart) TANDEM_FIELD(within_tolerance)
   // clang-format on
 #undef TANDEM_FIELD
-                                                      return object;
+                                                              return object;
 }
 
 template <typename Rows>

@@ -35,9 +35,8 @@ Corners any_corners(RandomPoses& random) {
 
 // A pose near another: what a body does in a few steps.
 Pose near(RandomPoses& random, const Pose& pose, double turn, double way) {
-  Pose by = random.pose({.translation = 0, .turn = 0});
   const double a = random.symmetric(turn);
-  by = {{{std::cos(a), -std::sin(a), 0}, {std::sin(a), std::cos(a), 0}, {0, 0, 1}}, {}};
+  const Pose by = {{{std::cos(a), -std::sin(a), 0}, {std::sin(a), std::cos(a), 0}, {0, 0, 1}}, {}};
   Pose out{};
   for (int i = 0; i < 3; ++i) {
     for (int j = 0; j < 3; ++j) {
@@ -109,7 +108,7 @@ TEST(PairMotion, NoPointOfTheSmallerBodyGoesFarther) {
   EXPECT_GT(small, 1000);
 }
 
-TEST(PairMotion, BodiesThatStandHaveNoneAndThoseThatMoveTogetherLittle) {
+TEST(PairMotion, BodiesThatStandHaveNone) {
   RandomPoses random(2);
   for (int trial = 0; trial < 1000; ++trial) {
     const Corners corners = any_corners(random);
@@ -175,7 +174,6 @@ TEST(MovedQuery, BodiesThatMoveTogetherDoNotMoveAgainstEachOther) {
   const Pose by = random.pose({.translation = 7});
   for (Instance& body : row.bodies) {
     const Pose before = body.pose;
-    body.pose.rotation[0][0] = 0;
     for (int i = 0; i < 3; ++i) {
       for (int j = 0; j < 3; ++j) {
         body.pose.rotation[i][j] = 0;

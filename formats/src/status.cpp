@@ -94,7 +94,7 @@ constexpr Entry kEntries[] = {
     {kPoseNotRigid, "PoseNotRigid", "instance", "a pose is not a rotation and a translation"},
     {kTooManyInstances, "TooManyInstances", nullptr, "there are 2^32 - 1 instances or more"},
     {kTooManyPairs, "TooManyPairs", nullptr, "there are 2^32 - 1 pairs of instances or more"},
-    {kKeptMismatch, "KeptMismatch", nullptr, "fixed instances are kept of another number of instances"},
+    {kKeptMismatch, "KeptMismatch", nullptr, "what is kept is of other instances or pairs"},
     {kMotionMismatch, "MotionMismatch", nullptr, "there are not as many motions as instances"},
     {kCannotStartThread, "CannotStartThread", nullptr, "a thread could not be started"},
     {kNoOrientedBlocks, "NoOrientedBlocks", nullptr,

@@ -37,6 +37,8 @@ struct HostOf<GpuManifoldReport> : GpuHost<ManifoldState, GpuManifoldReport> {
   ArgArray<&ManifoldArgs::summaries> summaries{of_pairs};
   ArgArray<&ManifoldArgs::tile_sums> tile_sums{of_pairs,
                                                [](std::uint64_t pairs) { return pairs / kManifoldTile + 1; }};
+  ArgArray<&ManifoldArgs::places> places{of_pairs, one_for_each, Growth::keeps};
+  ArgArray<&ManifoldArgs::places_before> places_before{of_pairs, one_for_each, Growth::keeps};
   ArgArray<&ManifoldArgs::table> table{*this};  // of the pairs of the call before
 
   Room<std::uint64_t> of_contacts{*this};
@@ -50,6 +52,9 @@ struct HostOf<GpuManifoldReport> : GpuHost<ManifoldState, GpuManifoldReport> {
   Room<std::uint32_t> of_manifolds{*this};
   ArgArray<&ManifoldArgs::manifolds> manifolds{of_manifolds, one_for_each, Growth::keeps};
   ArgArray<&ManifoldArgs::manifolds_before> manifolds_before{of_manifolds, one_for_each, Growth::keeps};
+  ArgArray<&ManifoldArgs::found_manifolds> found_manifolds{of_manifolds, one_for_each, Growth::keeps};
+  ArgArray<&ManifoldArgs::found_manifolds_before> found_manifolds_before{of_manifolds, one_for_each,
+                                                                         Growth::keeps};
   ArgArray<&ManifoldArgs::entries> entries{of_manifolds, one_for_each, Growth::keeps};
   ArgArray<&ManifoldArgs::begun> begun{of_manifolds};
   ArgArray<&ManifoldArgs::patches> patches{of_manifolds};
@@ -58,6 +63,8 @@ struct HostOf<GpuManifoldReport> : GpuHost<ManifoldState, GpuManifoldReport> {
   Room<std::uint32_t> of_points{*this};
   ArgArray<&ManifoldArgs::points> points{of_points, one_for_each, Growth::keeps};
   ArgArray<&ManifoldArgs::points_before> points_before{of_points, one_for_each, Growth::keeps};
+  ArgArray<&ManifoldArgs::found_points> found_points{of_points, one_for_each, Growth::keeps};
+  ArgArray<&ManifoldArgs::found_points_before> found_points_before{of_points, one_for_each, Growth::keeps};
 
   GpuManifoldCapacity capacity() const {
     return {of_pairs.count(), of_contacts.count(), of_manifolds.count(), of_points.count()};
@@ -123,7 +130,7 @@ struct HostOf<GpuManifoldReport> : GpuHost<ManifoldState, GpuManifoldReport> {
     args.groups = query.groups();
     args.query = query.device_report();
     args.capacity = capacity();
-    args.match_previous = options.match_previous;
+    args.match_previous = args.matches = options.match_previous;
     args.most_points = static_cast<int>(options.most_points);
     args.pieces = {pieces.data(), normals.data(), curve.data(), order.data(), start.data(), words.data()};
     args.table_size = static_cast<std::uint32_t>(table.room());
@@ -144,6 +151,27 @@ Status GpuManifoldQuery::enqueue(const GpuInstances& instances, const GpuPairs& 
   if (const Status status = check_most_points(options.most_points); status != Status::kOk) return status;
   const gpu::ManifoldArgs args = host_->args(instances, pairs, query, options);
   return host_->keep(gpu::queue(args, stream, gpu::remember_points, gpu::make_patches, gpu::place_manifolds));
+}
+
+Status GpuManifoldQuery::enqueue(const GpuInstances& instances, const GpuMoved& moved,
+                                 const GpuContactQuery& query, const GpuManifoldOptions& options,
+                                 cudaStream_t stream) {
+  if (const Status status = check_most_points(options.most_points); status != Status::kOk) return status;
+  gpu::ManifoldArgs args = host_->args(instances, moved.moved, query, options);
+  args.moved = moved;
+  args.match_previous = true;
+  return host_->keep(gpu::queue(args, stream, gpu::remember_kept, gpu::remember_points, gpu::make_patches,
+                                gpu::count_kept_manifolds, gpu::place_manifolds, gpu::move_kept_manifolds));
+}
+
+Status GpuManifoldQuery::make(const GpuInstances& instances, const GpuMoved& moved,
+                              const GpuContactQuery& query, const GpuManifoldOptions& options,
+                              cudaStream_t stream) {
+  GpuManifoldCapacity first = capacity();
+  first.pairs = std::max({first.pairs, moved.pairs.capacity, moved.moved.capacity});
+  first.contacts = std::max(first.contacts, query.report().contacts);
+  return gpu::find_behind(query, *host_, first, GpuNoOptions{}, stream,
+                          [&] { return enqueue(instances, moved, query, options, stream); });
 }
 
 Status GpuManifoldQuery::make(const GpuInstances& instances, const GpuPairs& pairs,

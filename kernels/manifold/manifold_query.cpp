@@ -4,6 +4,7 @@
 
 #include "kernels/common/check_options.h"
 #include "kernels/manifold/finish.h"
+#include "kernels/manifold/kept_manifold.h"
 #include "kernels/manifold/pair_patches.h"
 #include "kernels/manifold/shape.h"
 #include "kernels/scene/scene_state.h"
@@ -12,6 +13,8 @@ namespace tandem {
 namespace {
 
 using manifold::BodyPair;
+using manifold::FoundManifold;
+using manifold::FoundPoint;
 using manifold::OneThread;
 using manifold::Patch;
 using manifold::Shape;
@@ -19,13 +22,21 @@ using manifold::Shape;
 // Pairs with contacts that a thread takes at a time.
 constexpr std::size_t kRowsAtOnce = 16;
 
-// A pair that has contacts: where its patches lie, and where its manifolds and points go.
+// Pairs whose manifolds a thread keeps at a time.
+constexpr std::size_t kKeptAtOnce = 256;
+
+// A pair that has contacts, and where its patches lie.
 struct Row {
-  std::uint32_t pair;
+  std::uint32_t asked;  // its row of the pairs whose contacts these are
+  std::uint32_t pair;   // its row of all pairs
   std::uint32_t worker;
   std::size_t first_patch;
   std::uint32_t patches, points;
-  std::uint32_t first_manifold, first_point;
+};
+
+// The place of the manifolds and points of a pair.
+struct PairPlace {
+  std::uint32_t first_manifold, manifolds, first_point, points;
 };
 
 // The points of a pair of bodies.
@@ -47,9 +58,15 @@ std::uint64_t bodies_of(const ObjectPair& pair) {
 
 struct ManifoldQuery::State : Allocated {
   // The manifolds of a call and their points.
+  struct Rows {
+    Buffer<Manifold>& manifolds;
+    Buffer<ManifoldPoint>& points;
+  };
+
+  // What was found, to be moved if it is kept; each entry is about the manifold or point of the same index.
   struct Found {
-    Manifold* manifolds;
-    ManifoldPoint* points;
+    Buffer<FoundManifold> manifolds;
+    Buffer<FoundPoint> points;
   };
 
   std::uint64_t assets_id = 0;  // whose shapes these are
@@ -60,16 +77,23 @@ struct ManifoldQuery::State : Allocated {
   PerWorker<ManifoldWorker> workers;
   Buffer<Manifold> manifolds_before;
   Buffer<ManifoldPoint> points_before;
+  Buffer<PairPlace> places, places_before;  // of each pair
   Buffer<PairPoints> pair_points_before;
+  Found found, found_before;
+  std::uint64_t moved_call = 0;  // what was found is of that call of MovedQuery, or of none
 
   Status name_shapes(SceneState& scene);
   Status check_bodies(SceneState& scene) const;
   Status check(SceneState& scene, std::span<const ObjectPair> pairs, std::span<const Contact> contacts) const;
+  Status check_kept(SceneState& scene, const Asked& asked, bool on_device) const;
   Status group(SceneState& scene, std::size_t pairs, std::span<const Contact>& contacts);
+  void name_pairs(const MovedQuery* moved);
   void make_patches(std::size_t from, std::size_t to, std::uint32_t worker, const SceneState& scene,
                     std::span<const ObjectPair> pairs, std::span<const Contact> contacts, int most_points);
-  Status place_rows(SceneState& scene, Buffer<Manifold>& manifolds, Buffer<ManifoldPoint>& points);
-  void finish(Row& row, const SceneState& scene, const ObjectPair& pair, Found found, bool match);
+  Status place_pairs(SceneState& scene, std::size_t pairs, const MovedQuery* moved, Rows out);
+  void finish(const Row& row, const SceneState& scene, const ObjectPair& pair, bool remember, Rows out,
+              bool match);
+  void keep(std::uint32_t pair, const SceneState& scene, const MovedQuery& moved, Rows out, bool match);
   bool remember_step(std::span<const ObjectPair> pairs);
 };
 
@@ -78,6 +102,7 @@ Status ManifoldQuery::State::name_shapes(SceneState& scene) {
   if (assets_id == scene.assets_id) return Status::kOk;
   assets_id = 0;
   pair_points_before.clear();
+  moved_call = 0;
   shapes.clear();
   if (const Status status = scene.require_topology(); status != Status::kOk) return status;
   for (std::size_t i = 0; i < scene.assets.size(); ++i) {
@@ -123,7 +148,8 @@ Status ManifoldQuery::State::group(SceneState& scene, std::size_t pairs, std::sp
   }
   rows.clear();
   for (std::size_t i = 0; i < pairs; ++i) {
-    if (begin[i + 1] > 0 && !rows.push({static_cast<std::uint32_t>(i), 0, 0, 0, 0, 0, 0}))
+    if (begin[i + 1] > 0 &&
+        !rows.push({static_cast<std::uint32_t>(i), static_cast<std::uint32_t>(i), 0, 0, 0, 0}))
       return scene.fail(Status::kOutOfMemory, 0);
     if (begin[i + 1] > manifold::kMostContactsOfPair) return scene.fail(Status::kOutOfRange, i);
     begin[i + 1] += begin[i];
@@ -135,6 +161,17 @@ Status ManifoldQuery::State::group(SceneState& scene, std::size_t pairs, std::sp
   begin[0] = 0;
   contacts = grouped.view();
   return Status::kOk;
+}
+
+// Says which of all pairs those are that have contacts.
+void ManifoldQuery::State::name_pairs(const MovedQuery* moved) {
+  if (moved == nullptr) return;
+  std::size_t row = 0;
+  std::uint32_t asked = 0;
+  for (std::uint32_t pair = 0; row < rows.size(); ++pair) {
+    if (moved->kept_rows()[pair] != kNoIndex) continue;
+    if (rows[row].asked == asked++) rows[row++].pair = pair;
+  }
 }
 
 void ManifoldQuery::State::make_patches(std::size_t from, std::size_t to, std::uint32_t worker,
@@ -155,7 +192,7 @@ void ManifoldQuery::State::make_patches(std::size_t from, std::size_t to, std::u
     if (pair.a == pair.b) continue;
     const Instance &a = scene.instances[pair.a], &b = scene.instances[pair.b];
     const BodyPair bodies = {{shapes[a.asset], a.pose}, {shapes[b.asset], b.pose}};
-    const std::uint32_t first = begin[row.pair], count = begin[row.pair + 1] - first;
+    const std::uint32_t first = begin[row.asked], count = begin[row.asked + 1] - first;
     own.enough_memory = own.made.add(team, bodies, contacts.data() + first, count, most_points);
     row.patches = static_cast<std::uint32_t>(patches.size() - row.first_patch);
     for (std::uint32_t k = 0; k < row.patches; ++k) {
@@ -164,37 +201,49 @@ void ManifoldQuery::State::make_patches(std::size_t from, std::size_t to, std::u
   }
 }
 
-Status ManifoldQuery::State::place_rows(SceneState& scene, Buffer<Manifold>& manifolds,
-                                        Buffer<ManifoldPoint>& points) {
-  std::uint64_t next_manifold = 0, next_point = 0;
-  for (std::size_t i = 0; i < rows.size(); ++i) {
-    rows[i].first_manifold = static_cast<std::uint32_t>(next_manifold);
-    rows[i].first_point = static_cast<std::uint32_t>(next_point);
-    next_manifold += rows[i].patches;
-    next_point += rows[i].points;
+Status ManifoldQuery::State::place_pairs(SceneState& scene, std::size_t pairs, const MovedQuery* moved,
+                                         Rows out) {
+  if (!places.resize(pairs)) return scene.fail(Status::kOutOfMemory, 0);
+  std::fill_n(places.data(), pairs, PairPlace{});
+  for (const Row& row : rows.view()) {
+    places[row.pair].manifolds = row.patches;
+    places[row.pair].points = row.points;
   }
-  if (next_point >= kNoIndex) return scene.fail(Status::kOutOfRange, 0);
-  if (!manifolds.resize(next_manifold) || !points.resize(next_point))
-    return scene.fail(Status::kOutOfMemory, 0);
-  return Status::kOk;
+  std::uint64_t next_manifold = 0, next_point = 0;
+  for (std::size_t i = 0; i < pairs; ++i) {
+    if (moved != nullptr && moved->kept_rows()[i] != kNoIndex)
+      places[i] = places_before[moved->kept_rows()[i]];
+    places[i].first_manifold = static_cast<std::uint32_t>(next_manifold);
+    places[i].first_point = static_cast<std::uint32_t>(next_point);
+    next_manifold += places[i].manifolds;
+    next_point += places[i].points;
+  }
+  if (next_point >= kNoIndex || next_manifold >= kNoIndex) return scene.fail(Status::kOutOfRange, 0);
+  const bool has_memory =
+      out.manifolds.resize(next_manifold) && out.points.resize(next_point) &&
+      (moved == nullptr || (found.manifolds.resize(next_manifold) && found.points.resize(next_point)));
+  return has_memory ? Status::kOk : scene.fail(Status::kOutOfMemory, 0);
 }
 
-void ManifoldQuery::State::finish(Row& row, const SceneState& scene, const ObjectPair& pair, Found found,
-                                  bool match) {
+void ManifoldQuery::State::finish(const Row& row, const SceneState& scene, const ObjectPair& pair,
+                                  bool remember, Rows out, bool match) {
   Patch* const patches = workers[row.worker].made.patches.data() + row.first_patch;
   std::sort(patches, patches + row.patches, [](const Patch& x, const Patch& y) { return x.key < y.key; });
-  std::uint32_t next_manifold = row.first_manifold, next_point = row.first_point;
+  const PairPlace& place = places[row.pair];
+  std::uint32_t next_manifold = place.first_manifold, next_point = place.first_point;
   for (std::uint32_t i = 0; i < row.patches; ++i) {
-    Manifold& out = found.manifolds[next_manifold];
-    out = patches[i].manifold;
-    out.pair = row.pair;
-    out.first_point = next_point;
-    for (std::uint32_t k = 0; k < out.point_count; ++k) {
-      ManifoldPoint& point = found.points[next_point++];
+    Manifold& made = out.manifolds[next_manifold];
+    made = patches[i].manifold;
+    made.pair = row.pair;
+    made.first_point = next_point;
+    for (std::uint32_t k = 0; k < made.point_count; ++k) {
+      ManifoldPoint& point = out.points[next_point++];
       point = patches[i].point[k];
       point.id = manifold::feature_hash(bodies_of(pair), point.id);
       point.manifold = next_manifold;
+      if (remember) found.points[next_point - 1] = manifold::found(point);
     }
+    if (remember) found.manifolds[next_manifold] = manifold::found(made);
     ++next_manifold;
   }
   if (!match) return;
@@ -206,16 +255,45 @@ void ManifoldQuery::State::finish(Row& row, const SceneState& scene, const Objec
   const Shape &a = shapes[scene.instances[pair.a].asset], &b = shapes[scene.instances[pair.b].asset];
   const OneThread team;
   const manifold::PointMatcher<OneThread> matcher(team, std::min(a.diagonal, b.diagonal));
-  matcher.match(found.points, found.manifolds, row.first_point, row.points,
+  matcher.match(out.points.data(), out.manifolds.data(), place.first_point, place.points,
                 {manifolds_before.data(), points_before.data(), before->first, before->count});
+}
+
+// Moves the manifolds of a pair that is kept.
+void ManifoldQuery::State::keep(std::uint32_t pair, const SceneState& scene, const MovedQuery& moved,
+                                Rows out, bool match) {
+  const PairPlace &place = places[pair], &before = places_before[moved.kept_rows()[pair]];
+  if (place.manifolds == 0) return;
+  const PosedBodies& then = moved.posed()[pair];
+  const Instance &a = scene.instances[then.pair.a], &b = scene.instances[then.pair.b];
+  const manifold::KeptMotion motion({then.a.pose, then.b.pose}, {a.pose, b.pose},
+                                    moved.second_is_larger(a.asset, b.asset));
+  for (std::uint32_t i = 0; i < place.manifolds; ++i) {
+    const std::uint32_t to = place.first_manifold + i, from = before.first_manifold + i;
+    const FoundManifold& of_then = found.manifolds[to] = found_before.manifolds[from];
+    Manifold& kept = out.manifolds[to] = manifolds_before[from];
+    motion.move(of_then, kept);
+    kept.pair = pair;
+    kept.first_point = place.first_point + (kept.first_point - before.first_point);
+    for (std::uint32_t k = 0; k < kept.point_count; ++k) {
+      const std::uint32_t point_to = kept.first_point + k,
+                          point_from = before.first_point + (point_to - place.first_point);
+      found.points[point_to] = found_before.points[point_from];
+      ManifoldPoint& point = out.points[point_to] = points_before[point_from];
+      motion.move(of_then, found.points[point_to], kept, point);
+      point.previous = match ? point_from : kNoIndex;
+      point.manifold = to;
+      if (k == 0) kept.depth = point.depth;
+    }
+  }
 }
 
 // Keeps the manifolds and points in which the next call looks for its points.
 bool ManifoldQuery::State::remember_step(std::span<const ObjectPair> pairs) {
   pair_points_before.clear();
-  for (std::size_t i = 0; i < rows.size(); ++i) {
-    if (rows[i].points == 0) continue;
-    if (!pair_points_before.push({bodies_of(pairs[rows[i].pair]), rows[i].first_point, rows[i].points}))
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    if (places[i].points == 0) continue;
+    if (!pair_points_before.push({bodies_of(pairs[i]), places[i].first_point, places[i].points}))
       return false;
   }
   std::sort(pair_points_before.data(), pair_points_before.data() + pair_points_before.size(),
@@ -225,12 +303,26 @@ bool ManifoldQuery::State::remember_step(std::span<const ObjectPair> pairs) {
   return true;
 }
 
-Status ManifoldQuery::answer(SceneState& scene, State& state, std::span<const Contact> contacts,
+// What is kept is what the call before found. The device knows by itself what it found.
+Status ManifoldQuery::State::check_kept(SceneState& scene, const Asked& asked, bool on_device) const {
+  if (asked.moved == nullptr) return Status::kOk;
+  const MovedQuery& moved = *asked.moved;
+  const bool stands = moved.call() != 0 && moved.is_of(scene);
+  const bool is_known =
+      on_device || moved.counters().kept == 0 || (moved_call != 0 && moved_call == moved.call_before());
+  const bool fits = stands && is_known && std::ranges::equal(asked.pairs, moved.rows());
+  return fits ? Status::kOk : scene.fail(Status::kKeptMismatch, 0);
+}
+
+Status ManifoldQuery::answer(SceneState& scene, State& state, const Asked& asked,
                              const ManifoldOptions& options) {
   const std::span<const ObjectPair> pairs = pairs_.view();
-  Status status = state.check(scene, pairs, contacts);
-  if (status == Status::kOk) status = state.group(scene, pairs.size(), contacts);
+  const MovedQuery* const moved = asked.moved;
+  std::span<const Contact> contacts = asked.contacts;
+  Status status = state.check(scene, asked.pairs, contacts);
+  if (status == Status::kOk) status = state.group(scene, asked.pairs.size(), contacts);
   if (status != Status::kOk) return status;
+  state.name_pairs(moved);
   const auto most_points = static_cast<int>(options.most_points);
   const std::uint32_t workers = scene.workers_for(state.rows.size(), kRowsAtOnce);
   if (!scene.threads.provide(workers)) return scene.fail(Status::kCannotStartThread, 0);
@@ -247,42 +339,61 @@ Status ManifoldQuery::answer(SceneState& scene, State& state, std::span<const Co
   for (std::uint32_t i = 0; i < workers; ++i) {
     if (!state.workers[i].enough_memory) return scene.fail(Status::kOutOfMemory, 0);
     counters_.segments += state.workers[i].made.segments;
-    counters_.ambiguous_touches += state.workers[i].made.ambiguous_touches;
   }
-  if ((status = state.place_rows(scene, rows_, points_)) != Status::kOk) return status;
-  scene.threads.for_parts(workers, state.rows.size(), kRowsAtOnce,
-                          [&](std::size_t from, std::size_t to, std::uint32_t) {
-                            for (std::size_t i = from; i < to; ++i) {
-                              state.finish(state.rows[i], scene, pairs[state.rows[i].pair],
-                                           {rows_.data(), points_.data()}, options.match_previous);
-                            }
-                          });
+  const State::Rows out = {rows_, points_};
+  if ((status = state.place_pairs(scene, pairs.size(), moved, out)) != Status::kOk) return status;
+  scene.threads.for_parts(
+      workers, state.rows.size(), kRowsAtOnce, [&](std::size_t from, std::size_t to, std::uint32_t) {
+        for (std::size_t i = from; i < to; ++i) {
+          const Row& row = state.rows[i];
+          state.finish(row, scene, pairs[row.pair], moved != nullptr, out, options.match_previous);
+        }
+      });
+  if (moved != nullptr) {
+    const std::uint32_t of_pairs = scene.workers_for(pairs.size(), kKeptAtOnce);
+    if (!scene.threads.provide(of_pairs)) return scene.fail(Status::kCannotStartThread, 0);
+    scene.threads.for_parts(
+        of_pairs, pairs.size(), kKeptAtOnce, [&](std::size_t from, std::size_t to, std::uint32_t) {
+          for (std::size_t i = from; i < to; ++i) {
+            if (moved->kept_rows()[i] != kNoIndex)
+              state.keep(static_cast<std::uint32_t>(i), scene, *moved, out, options.match_previous);
+          }
+        });
+  }
   counters_.contacts = contacts.size();
   counters_.manifolds = rows_.size();
   counters_.points = points_.size();
-  for (const Manifold& made : rows_.view()) counters_.open_curves += (made.flags & kOpenCurve) != 0;
+  for (const Manifold& made : rows_.view()) {
+    counters_.open_curves += (made.flags & kOpenCurve) != 0;
+    counters_.ambiguous_touches += (made.flags & kAmbiguous) != 0;
+  }
+  state.moved_call = moved != nullptr ? moved->call() : 0;
   return !options.match_previous || state.remember_step(pairs) ? Status::kOk
                                                                : scene.fail(Status::kOutOfMemory, 0);
 }
 
-// query: that has found the contacts, or null.
-Status ManifoldQuery::ask(Scene& in, std::span<const ObjectPair> pairs, std::span<const Contact> contacts,
-                          const ContactQuery* query, const ManifoldOptions& options) {
+Status ManifoldQuery::ask(Scene& in, const Asked& asked, const ManifoldOptions& options) {
   SceneState* const scene = in.state();
   State* const state = state_.provide();
   Status status = Status::kOutOfMemory;
   if (scene != nullptr && state != nullptr) {
-    const DeviceMemory* const on_device = query != nullptr ? query->on_device_of(*scene) : nullptr;
+    const DeviceMemory* const on_device =
+        asked.query != nullptr ? asked.query->on_device_of(*scene) : nullptr;
     if (!options.match_previous || on_device != nullptr) state->pair_points_before.clear();
     std::swap(rows_, state->manifolds_before);
     std::swap(points_, state->points_before);
+    std::swap(state->places, state->places_before);
+    std::swap(state->found, state->found_before);
     status = check_most_points(options.most_points);
     status = status == Status::kOk ? state->name_shapes(*scene) : scene->fail(status, 0);
-    if (status == Status::kOk) status = scene->take_pairs(pairs, pairs_);
+    if (status == Status::kOk) status = state->check_kept(*scene, asked, on_device != nullptr);
+    if (status == Status::kOk)
+      status = scene->take_pairs(asked.moved != nullptr ? asked.moved->pairs() : asked.pairs, pairs_);
     if (status == Status::kOk) status = state->check_bodies(*scene);
     if (status == Status::kOk) {
-      status = on_device != nullptr ? scene->ask_device(options, *on_device, points_, found())
-                                    : answer(*scene, *state, contacts, options);
+      if (on_device != nullptr) state->moved_call = 0;
+      status = on_device != nullptr ? scene->ask_device(options, asked.moved, *on_device, points_, found())
+                                    : answer(*scene, *state, asked, options);
     }
   }
   if (status == Status::kOk) return status;
@@ -293,15 +404,28 @@ Status ManifoldQuery::ask(Scene& in, std::span<const ObjectPair> pairs, std::spa
 
 Status ManifoldQuery::find(Scene& scene, std::span<const ObjectPair> pairs, std::span<const Contact> contacts,
                            const ManifoldOptions& options) {
-  return ask(scene, pairs, contacts, nullptr, options);
+  return ask(scene, {pairs, contacts, nullptr, nullptr}, options);
 }
 
 Status ManifoldQuery::find(Scene& scene, const ContactQuery& contacts, const ManifoldOptions& options) {
-  return ask(scene, contacts.pairs(), contacts.rows(), &contacts, options);
+  return ask(scene, {contacts.pairs(), contacts.rows(), &contacts, nullptr}, options);
+}
+
+Status ManifoldQuery::find(Scene& scene, const MovedQuery& moved, std::span<const Contact> contacts,
+                           const ManifoldOptions& options) {
+  return ask(scene, {moved.rows(), contacts, nullptr, &moved}, options);
+}
+
+Status ManifoldQuery::find(Scene& scene, const MovedQuery& moved, const ContactQuery& contacts,
+                           const ManifoldOptions& options) {
+  return ask(scene, {contacts.pairs(), contacts.rows(), &contacts, &moved}, options);
 }
 
 void ManifoldQuery::forget_points() {
-  if (State* const state = state_.get()) state->pair_points_before.clear();
+  if (State* const state = state_.get()) {
+    state->pair_points_before.clear();
+    state->moved_call = 0;
+  }
   memory_on_device_.reset();
 }
 

@@ -18,17 +18,18 @@ constexpr std::uint32_t kPairsPerThread = kManifoldTile / kThreads;
 constexpr Counter kOwnSum = Counter{1} << 62, kSumUpToHere = Counter{2} << 62, kSumBits = kOwnSum - 1;
 constexpr int kManifoldShift = 31;
 
-__device__ std::uint32_t pair_count(const ManifoldArgs& args) {
-  return *args.pairs.count < args.capacity.pairs ? *args.pairs.count : args.capacity.pairs;
+/// Returns the row of a pair among those that were asked about, or kNoIndex if it is kept.
+__device__ std::uint32_t asked_row(const ManifoldArgs& args, std::uint32_t pair) {
+  if (args.moved.call == nullptr) return pair;
+  return args.moved.kept_rows[pair] == kNoIndex ? args.moved.moved_rows[pair] : kNoIndex;
 }
 
-/// Returns whether all had room: the same for all threads of all kernels behind make_patches().
-__device__ bool is_complete(const ManifoldArgs& args) {
-  const ManifoldState& state = *args.state;
-  return args.query->status == Status::kOk && args.query->complete != 0 &&
-         args.query->contacts <= args.capacity.contacts && *args.pairs.count <= args.capacity.pairs &&
-         state.too_many_contacts == 0 && state.next_patch <= args.capacity.manifolds &&
-         state.needed_points <= args.capacity.points;
+/// Returns how many manifolds and points a pair has; their places are not known yet.
+__device__ PairPlace size_of(const ManifoldArgs& args, std::uint32_t pair) {
+  const std::uint32_t asked = asked_row(args, pair);
+  if (asked == kNoIndex) return args.places_before[args.moved.kept_rows[pair]];
+  const PairPatches& made = args.of_pair[asked];
+  return {0, made.patches, 0, made.points};
 }
 
 /// The sum of all tiles before this one (Merrill and Garland 2016). One thread calls it, because tiles are
@@ -49,15 +50,18 @@ __device__ void write_report(const ManifoldArgs& args, std::uint32_t manifolds, 
   ManifoldState& state = *args.state;
   const bool complete = is_complete(args);
   GpuManifoldReport report = {};
+  const bool keeps = args.moved.call != nullptr;
+  const Counter needed_points = state.needed_points + (keeps ? state.kept_points : 0);
   report.status = args.query->status != Status::kOk ? args.query->status
                   : state.too_many_contacts != 0    ? Status::kOutOfRange
+                  : !knows_kept(args)               ? Status::kKeptMismatch
                                                     : Status::kOk;
   report.complete = complete ? 1 : 0;
-  report.needed.pairs = *args.pairs.count;
+  report.needed.pairs = keeps ? *args.moved.pairs.count : *args.pairs.count;
   report.needed.contacts = args.query->complete != 0 ? args.query->contacts : args.query->needed.contacts;
-  report.needed.manifolds = state.next_patch;
+  report.needed.manifolds = static_cast<std::uint32_t>(state.next_patch + (keeps ? state.kept_manifolds : 0));
   report.needed.points =
-      state.needed_points < 0x7FFFFFFFull ? static_cast<std::uint32_t>(state.needed_points) : 0x7FFFFFFFu;
+      needed_points < 0x7FFFFFFFull ? static_cast<std::uint32_t>(needed_points) : 0x7FFFFFFFu;
   if (complete) {
     report.manifolds = manifolds;
     report.points = points;
@@ -69,6 +73,8 @@ __device__ void write_report(const ManifoldArgs& args, std::uint32_t manifolds, 
   // Manifolds that did not fit are not remembered; those that were remembered before stay.
   state.last_manifolds = report.manifolds;
   state.last_points = report.points;
+  state.last_pairs = complete ? pair_count(args) : 0;
+  state.moved_call = keeps ? args.moved.call->call : 0;
   state.has_last = complete && args.match_previous ? 1 : 0;
 }
 
@@ -78,8 +84,10 @@ __device__ void place_tile(const ManifoldArgs& args, std::uint32_t tile, std::ui
   __shared__ Counter before;
   const std::uint32_t first = tile * kManifoldTile + threadIdx.x * kPairsPerThread;
   Counter sum = 0, own = 0;
-  for (std::uint32_t i = first; i < first + kPairsPerThread && i < pairs; ++i)
-    sum += Counter{args.of_pair[i].patches} << kManifoldShift | args.of_pair[i].points;
+  for (std::uint32_t i = first; i < first + kPairsPerThread && i < pairs; ++i) {
+    const PairPlace size = size_of(args, i);
+    sum += Counter{size.manifolds} << kManifoldShift | size.points;
+  }
   Scan(scratch).ExclusiveSum(sum, sum, own);
   if (threadIdx.x == 0) {
     volatile Counter* const word = &args.tile_sums[tile];
@@ -96,9 +104,12 @@ __device__ void place_tile(const ManifoldArgs& args, std::uint32_t tile, std::ui
       write_report(args, manifolds, points);
       break;
     }
-    PairPatches& pair = args.of_pair[i];
-    pair.first_manifold = manifolds, pair.first_point = points;
-    sum += Counter{pair.patches} << kManifoldShift | pair.points;
+    const PairPlace size = size_of(args, i);
+    const std::uint32_t asked = asked_row(args, i);
+    args.places[i] = {manifolds, size.manifolds, points, size.points};
+    if (asked != kNoIndex)
+      args.of_pair[asked].first_manifold = manifolds, args.of_pair[asked].first_point = points;
+    sum += Counter{size.manifolds} << kManifoldShift | size.points;
   }
   __syncthreads();
 }
@@ -135,6 +146,7 @@ __device__ void sort_patches(const ManifoldArgs& args, const PairPatches& pair, 
   team.sync();
 }
 
+/// row: of the pairs that were asked about.
 __device__ void write_pair(const ManifoldArgs& args, std::uint32_t row) {
   const WarpTeam team(nullptr);
   const PairPatches pair = args.of_pair[row];
@@ -145,6 +157,7 @@ __device__ void write_pair(const ManifoldArgs& args, std::uint32_t row) {
   sort_patches(args, pair, list, sorted);
   const auto patch = [&](std::uint32_t i) -> Patch& { return args.patches[sorted[i]]; };
   const ObjectPair bodies = args.pairs.pairs[row];
+  const bool keeps = args.moved.call != nullptr;
   const std::uint64_t both = std::uint64_t{bodies.a} << 32 | bodies.b;
   std::uint32_t next_manifold = pair.first_manifold, next_point = pair.first_point;
   for (std::uint32_t i = 0; i < pair.patches; ++i) {
@@ -152,9 +165,10 @@ __device__ void write_pair(const ManifoldArgs& args, std::uint32_t row) {
     const std::uint32_t points = from.manifold.point_count;
     if (team.rank() == 0) {
       Manifold out = from.manifold;
-      out.pair = row;
+      out.pair = keeps ? args.moved.row_of_moved[row] : row;
       out.first_point = next_point;
       args.manifolds[next_manifold] = out;
+      if (keeps) args.found_manifolds[next_manifold] = manifold::found(out);
       args.entries[next_manifold] = {both, pair.first_point,
                                      next_manifold == pair.first_manifold ? pair.points : 0};
     }
@@ -163,12 +177,13 @@ __device__ void write_pair(const ManifoldArgs& args, std::uint32_t row) {
       point.id = manifold::feature_hash(both, point.id);
       point.manifold = next_manifold;
       args.points[next_point + k] = point;
+      if (keeps) args.found_points[next_point + k] = manifold::found(point);
     }
     ++next_manifold;
     next_point += points;
   }
   team.sync();
-  if (!args.match_previous) return;
+  if (!args.matches) return;
   auto slot = static_cast<std::uint32_t>((manifold::mixed(both) >> 32) * args.table_size >> 32);
   const std::uint32_t step = args.state->step;
   while (args.table[slot].step == step) {

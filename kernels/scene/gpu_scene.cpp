@@ -6,6 +6,7 @@
 #include <span>
 #include <type_traits>
 
+#include "kernels/geometry/pair_motion.h"
 #include "kernels/scene/scene_state.h"
 #include "tandem/formats/gpu_memory.h"
 #include "tandem/formats/gpu_status.h"
@@ -84,11 +85,13 @@ class Gpu final : public SceneDevice {
     on_gpu.sorted = on_gpu.grouped = true;
     on_gpu.within = options.within;
     on_gpu.add_error_bounds = options.add_error_bounds;
-    return ask<GpuContactQuery>(scene, found, has_blocks, [&](auto& query) {
+    const auto find_contacts = [&](auto& query) {
       Status status = query.find_contacts(instances_, pairs_, on_gpu, kStream);
       if (status == Status::kOk) status = copy(query.contacts(), query.report().contacts, found.rows);
       return status;
-    });
+    };
+    // Of no pairs, too: manifolds that are kept may be made of these contacts.
+    return ask<GpuContactQuery>(scene, found, has_blocks, find_contacts, scene.bodies.size() == 0);
   }
 
   Status find(SceneState& scene, const DistanceOptions& options,
@@ -132,13 +135,19 @@ class Gpu final : public SceneDevice {
     return ask<GpuImpactQuery>(scene, found, require_oriented_blocks(scene), find_impacts, is_empty);
   }
 
-  Status find(SceneState& scene, const ManifoldOptions& options, const DeviceMemory& contacts,
-              Buffer<ManifoldPoint>& points, const DeviceAnswer<Manifold, ManifoldCounters>& found) override {
+  Status find(SceneState& scene, const ManifoldOptions& options, const MovedQuery* moved,
+              const DeviceMemory& contacts, Buffer<ManifoldPoint>& points,
+              const DeviceAnswer<Manifold, ManifoldCounters>& found) override {
     if (found.pairs.size() == 0) found.memory.reset();  // no points of before are found again
     points.clear();
     const GpuManifoldOptions on_gpu = {options.match_previous, options.most_points};
     return ask<GpuManifoldQuery>(scene, found, Status::kOk, [&](auto& query) {
-      Status status = query.make(instances_, pairs_, query_of<GpuContactQuery>(contacts), on_gpu, kStream);
+      const auto& query_of_contacts = query_of<GpuContactQuery>(contacts);
+      GpuMoved on_gpu_moved = {};
+      Status status = moved != nullptr ? upload_moved(scene, *moved, on_gpu_moved) : Status::kOk;
+      if (status == Status::kOk)
+        status = moved != nullptr ? query.make(instances_, on_gpu_moved, query_of_contacts, on_gpu, kStream)
+                                  : query.make(instances_, pairs_, query_of_contacts, on_gpu, kStream);
       if (status == Status::kOk) status = copy(query.manifolds(), query.report().manifolds, found.rows);
       if (status == Status::kOk) status = copy(query.points(), query.report().points, points);
       return status;
@@ -251,6 +260,38 @@ class Gpu final : public SceneDevice {
     return status == Status::kOk ? wait() : status;
   }
 
+  // What a question about the pairs that have moved found on the CPU; pairs_ are all of them.
+  Status upload_moved(const SceneState& scene, const MovedQuery& moved, GpuMoved& on_gpu) {
+    const std::size_t pairs = moved.pairs().size(), rows = moved.rows().size();
+    if (!boxes_.resize(scene.assets.size()) || !moved_rows_.resize(pairs) || !row_of_moved_.resize(rows))
+      return Status::kOutOfMemory;
+    for (std::size_t i = 0; i < boxes_.size(); ++i)
+      boxes_[i] = asset_box(scene.assets[i].lower, scene.assets[i].upper, scene.assets[i].origin);
+    std::uint32_t row = 0;
+    for (std::uint32_t i = 0; i < pairs; ++i) {
+      moved_rows_[i] = row;
+      if (moved.kept_rows()[i] == kNoIndex) row_of_moved_[row++] = i;
+    }
+    const GpuMovedCall call = {moved.call(), moved.call_before(), static_cast<std::uint32_t>(pairs - rows)};
+    Status status = upload(moved.rows(), moved_pair_on_gpu_);
+    if (status == Status::kOk) status = upload(std::span<const std::uint32_t>(&row, 1), moved_count_);
+    if (status == Status::kOk) status = upload(moved.kept_rows(), kept_rows_on_gpu_);
+    if (status == Status::kOk) status = upload(moved_rows_.view(), moved_rows_on_gpu_);
+    if (status == Status::kOk) status = upload(row_of_moved_.view(), row_of_moved_on_gpu_);
+    if (status == Status::kOk) status = upload(moved.posed(), posed_on_gpu_);
+    if (status == Status::kOk) status = upload(boxes_.view(), boxes_on_gpu_);
+    if (status == Status::kOk) status = upload(std::span<const GpuMovedCall>(&call, 1), call_on_gpu_);
+    on_gpu = {pairs_,
+              {moved_pair_on_gpu_.data(), moved_count_.data(), row},
+              kept_rows_on_gpu_.data(),
+              moved_rows_on_gpu_.data(),
+              row_of_moved_on_gpu_.data(),
+              posed_on_gpu_.data(),
+              boxes_on_gpu_.data(),
+              call_on_gpu_.data()};
+    return status == Status::kOk ? wait() : status;
+  }
+
   // The motion of a removed body, which may be anything, is not looked at.
   Status upload_motions(const SceneState& scene, std::span<const RigidMotion> motions) {
     if (!motions_.resize(motions.size())) return Status::kOutOfMemory;
@@ -348,7 +389,13 @@ class Gpu final : public SceneDevice {
   GpuArray<Pose> pose_on_gpu_;
   GpuArray<Motion> motion_on_gpu_;
   GpuArray<RigidMotion> motions_on_gpu_;
-  GpuArray<ObjectPair> pair_on_gpu_;
+  GpuArray<ObjectPair> pair_on_gpu_, moved_pair_on_gpu_;
+  Buffer<AssetBox> boxes_;
+  Buffer<std::uint32_t> moved_rows_, row_of_moved_;
+  GpuArray<std::uint32_t> moved_count_, kept_rows_on_gpu_, moved_rows_on_gpu_, row_of_moved_on_gpu_;
+  GpuArray<PosedBodies> posed_on_gpu_;
+  GpuArray<AssetBox> boxes_on_gpu_;
+  GpuArray<GpuMovedCall> call_on_gpu_;
   GpuExcludedPairs excluded_;
   GpuInstances instances_ = {};
   GpuPairs pairs_ = {};

@@ -35,9 +35,10 @@ class SceneDevice : public Allocated {
   virtual Status find(SceneState& scene, const ImpactOptions& options, bool finds_pairs,
                       const DeviceAnswer<Impact, ImpactCounters>& found) = 0;
 
-  /// contacts: those that this device found of the same pairs.
-  virtual Status find(SceneState& scene, const ManifoldOptions& options, const DeviceMemory& contacts,
-                      Buffer<ManifoldPoint>& points,
+  /// contacts: those that this device found of the same pairs, or of the rows of `moved`, if that is not
+  /// null.
+  virtual Status find(SceneState& scene, const ManifoldOptions& options, const MovedQuery* moved,
+                      const DeviceMemory& contacts, Buffer<ManifoldPoint>& points,
                       const DeviceAnswer<Manifold, ManifoldCounters>& found) = 0;
   virtual Status find(SceneState& scene, const DeviceMemory& contacts,
                       const DeviceAnswer<Containment, ContainmentCounters>& found) = 0;

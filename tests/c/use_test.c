@@ -295,6 +295,37 @@ static void test_rows_and_calls(const tandem_allocator* allocator) {
   CHECK(counters.contacts.contacts == 964 && counters.verdicts.touching == 17 &&
         counters.impacts.object_pairs == 0);
 
+  // Pairs that have not moved keep their manifolds.
+  const double tolerance_of_pair[17] = {0};
+  tandem_moved_options tolerant = {.struct_size = sizeof tolerant, .tolerance = 0.01};
+  const tandem_manifold_options keep = {sizeof keep, 0, 1, 1};
+  size_t manifold_count = 0;
+  for (int step = 0; step < 3; ++step) {
+    CHECK_STATUS(tandem_scene_find_moved(scene, &tolerant), TANDEM_OK);
+    options = (tandem_contact_options){.struct_size = sizeof options};
+    options.pairs = tandem_scene_moved(scene, &options.pair_count);
+    CHECK(options.pair_count == (step == 1 ? 0 : 17) && pair_count(scene, TANDEM_MOVED) == 17);
+    if (options.pairs == NULL) options.pairs = tandem_scene_pairs(scene, TANDEM_MOVED, NULL);
+    CHECK_STATUS(tandem_scene_find_contacts(scene, &options), TANDEM_OK);
+    CHECK_STATUS(tandem_scene_find_manifolds(scene, &keep), TANDEM_OK);
+    CHECK(tandem_scene_manifolds(scene, &count) != NULL && (step == 0 || count == manifold_count));
+    manifold_count = count;
+    CHECK_STATUS(tandem_scene_get_counters(scene, &counters), TANDEM_OK);
+    CHECK(counters.moved.object_pairs == 17 && counters.moved.kept == (step == 1 ? 17 : 0));
+    tolerant.tolerance_of_pair = step == 1 ? tolerance_of_pair : NULL;
+    tolerant.tolerance_count = step == 1 ? 17 : 0;
+  }
+  CHECK_STATUS(tandem_scene_find_moved(scene, NULL), TANDEM_OK);
+  CHECK_STATUS(tandem_scene_find_manifolds(scene, NULL), TANDEM_OK);
+  tolerant.tolerance_count = 0;
+  tolerant.tolerance_of_pair = NULL;
+  CHECK_STATUS(tandem_scene_find_moved(scene, &tolerant), TANDEM_OK);
+  CHECK_STATUS(tandem_scene_find_manifolds(scene, &keep), TANDEM_KEPT_MISMATCH);
+  CHECK(tandem_scene_manifolds(scene, &count) == NULL && count == 0);
+  tolerant.tolerance = -1;
+  CHECK_STATUS(tandem_scene_find_moved(scene, &tolerant), TANDEM_BAD_TOLERANCE);
+  CHECK(tandem_scene_moved(scene, &count) == NULL && count == 0);
+
   const tandem_pose start = at(3, 0, 0).pose;
   const tandem_motion motion = {{-400, 0, 0}, {0, 0, 0}, {3, 0, 0}};
   tandem_pose stopped;

@@ -127,6 +127,13 @@ class CDoor final : public Door {
       found.rows.resize(found.pairs.size());
       return found;
     }
+    if (question == "moved") {
+      auto chosen = sized<tandem_moved_options>();
+      chosen.tolerance = number(options, "tolerance", 0);
+      about(chosen);
+      return answered(tandem_scene_find_moved(scene_, &chosen), TANDEM_MOVED, tandem_scene_moved,
+                      &tandem_counters::moved);
+    }
     if (question == "contacts") {
       auto chosen = sized<tandem_contact_options>();
       const std::string mode = options.value("mode", "exact");
@@ -143,8 +150,10 @@ class CDoor final : public Door {
       auto chosen = sized<tandem_manifold_options>();
       chosen.most_points = options.value("most_points", 0u);
       chosen.ignore_previous = !flag(options, "match_previous", true);
-      Found found = answered(tandem_scene_find_manifolds(scene_, &chosen), TANDEM_CONTACTS,
-                             tandem_scene_manifolds, &tandem_counters::manifolds);
+      chosen.keep = flag(options, "keep");
+      Found found = answered(tandem_scene_find_manifolds(scene_, &chosen),
+                             chosen.keep != 0 ? TANDEM_MOVED : TANDEM_CONTACTS, tandem_scene_manifolds,
+                             &tandem_counters::manifolds);
       found.points = objects_of(rows_of(tandem_scene_points, scene_));
       return found;
     }

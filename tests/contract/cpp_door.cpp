@@ -72,6 +72,8 @@ class CppDoor final : public Door {
       found.rows.resize(found.pairs.size());
       return found;
     }
+    if (question == "moved")
+      return about_pairs(moved_, options, {.tolerance = number(options, "tolerance", 0)});
     if (question == "contacts") return contacts(options);
     if (question == "manifolds") return manifolds(options);
     if (question == "contained") return shown(contained_, contained_.find(*scene_, contacts_));
@@ -113,7 +115,8 @@ class CppDoor final : public Door {
   Found manifolds(const Json& options) {
     ManifoldOptions chosen{.match_previous = flag(options, "match_previous", true)};
     if (options.contains("most_points")) chosen.most_points = options["most_points"];
-    const Status status = manifolds_.find(*scene_, contacts_, chosen);
+    const Status status = flag(options, "keep") ? manifolds_.find(*scene_, moved_, contacts_, chosen)
+                                                : manifolds_.find(*scene_, contacts_, chosen);
     Found found = shown(manifolds_, status);
     found.points = objects_of(manifolds_.points());
     return found;
@@ -144,6 +147,7 @@ class CppDoor final : public Door {
   std::vector<MappedAsset> assets_;
   std::shared_ptr<Scene> scene_;
   ExcludedPairTable excluded_;
+  MovedQuery moved_;
   ContactQuery contacts_;
   ManifoldQuery manifolds_;
   ContainmentQuery contained_;

@@ -118,7 +118,7 @@ Json object_of(const Row& row) {
 // clang-format off
 #define TANDEM_FIELD(field) \
   if constexpr (requires { row.field; }) object[#field] = plain(row.field);
-  TANDEM_FIELD(point) TANDEM_FIELD(body) TANDEM_FIELD(pair) TANDEM_FIELD(triangle_a) TANDEM_FIELD(triangle_b) TANDEM_FIELD(face_a)
+  TANDEM_FIELD(a) TANDEM_FIELD(b) TANDEM_FIELD(kept) TANDEM_FIELD(point) TANDEM_FIELD(body) TANDEM_FIELD(pair) TANDEM_FIELD(triangle_a) TANDEM_FIELD(triangle_b) TANDEM_FIELD(face_a)
   TANDEM_FIELD(face_b) TANDEM_FIELD(normal) TANDEM_FIELD(area_vector) TANDEM_FIELD(centre)
   TANDEM_FIELD(depth) TANDEM_FIELD(first_point) TANDEM_FIELD(point_count) TANDEM_FIELD(flags)
   TANDEM_FIELD(position) TANDEM_FIELD(in_a) TANDEM_FIELD(in_b) TANDEM_FIELD(id) TANDEM_FIELD(previous)
@@ -130,7 +130,7 @@ Json object_of(const Row& row) {
   TANDEM_FIELD(at_start) TANDEM_FIELD(found) TANDEM_FIELD(apart) TANDEM_FIELD(within_tolerance)
   // clang-format on
 #undef TANDEM_FIELD
-                                                      return object;
+                                                              return object;
 }
 
 template <typename Rows>

@@ -1,23 +1,29 @@
 #include "analytic_contacts.h"
 
 #include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
+#include <utility>
+
+#include "kernels/geometry/pair_motion.h"
 
 namespace tandem::simulation {
 namespace {
 
 using Eigen::Vector3d;
 
-class NoContacts : public ContactFinder {
- public:
-  const std::vector<ContactPoint>& find(std::span<const BodyPose>, std::span<const std::uint8_t>,
-                                        std::span<const ObjectPair>) override {
-    return none_;
-  }
+constexpr double kWide = 1e4;  // the radius of a half-space
 
- private:
-  std::vector<ContactPoint> none_;
+class NoContacts : public AnalyticContacts {
+  void find_all(std::span<const BodyPose>, std::vector<ContactPoint>&) override {}
+  double radius(std::uint32_t) const override { return kWide; }
 };
+
+// A cube in a sphere of this radius.
+AssetBox cube_of(double radius) {
+  const auto half = static_cast<float>(radius / std::sqrt(3));
+  return asset_box({-half, -half, -half}, {half, half, half}, {0, 0, 0});
+}
 
 Vector3d to_world(const Pose& pose, const Vector3d& point) {
   Vector3d out;
@@ -33,68 +39,99 @@ Vector3d to_body(const Pose& pose, const Vector3d& point) {
   return rotation_of(pose).transpose() * (point - Eigen::Map<const Vector3d>(pose.translation));
 }
 
-class BoxesOnPlane : public ContactFinder {
+class BoxesOnPlane : public AnalyticContacts {
  public:
-  BoxesOnPlane(const Vector3d& normal, const Vector3d& size) : normal_(normal), half_(0.5 * size) {}
-
-  const std::vector<ContactPoint>& find(std::span<const BodyPose> bodies, std::span<const std::uint8_t>,
-                                        std::span<const ObjectPair>) override {
-    points_.clear();
-    for (std::uint32_t i = 1; i < bodies.size(); ++i) on_plane(i, bodies[i].pose);
-    for (std::uint32_t i = 1; i + 1 < bodies.size(); ++i) on_box(i, bodies[i].pose, bodies[i + 1].pose);
-    return points_;
-  }
+  BoxesOnPlane(const Vector3d& normal, const Vector3d& size, double flicker)
+      : normal_(normal), half_(0.5 * size), flicker_(flicker) {}
 
  private:
+  void find_all(std::span<const BodyPose> bodies, std::vector<ContactPoint>& points) override {
+    for (std::uint32_t i = 1; i < bodies.size(); ++i) on_plane(i, bodies[i].pose, points);
+    for (std::uint32_t i = 1; i + 1 < bodies.size(); ++i)
+      on_box(i, bodies[i].pose, bodies[i + 1].pose, points);
+    for (ContactPoint& point : points) point.depth += flicker_ * static_cast<double>(++calls_ % 3);
+  }
+  double radius(std::uint32_t body) const override { return body == 0 ? kWide : half_.norm(); }
+
   Vector3d corner(int i) const {
     return {i & 1 ? half_.x() : -half_.x(), i & 2 ? half_.y() : -half_.y(), i & 4 ? half_.z() : -half_.z()};
   }
 
-  void on_plane(std::uint32_t body, const Pose& pose) {
+  void on_plane(std::uint32_t body, const Pose& pose, std::vector<ContactPoint>& points) const {
     for (int i = 0; i < 8; ++i) {
       const Vector3d at = to_world(pose, corner(i));
       const double height = normal_.dot(at);
-      if (height <= 0) points_.push_back({0, body, at, normal_, -height, static_cast<std::uint64_t>(i + 1)});
+      if (height <= 0) points.push_back({0, body, at, normal_, -height, static_cast<std::uint64_t>(i + 1)});
     }
   }
 
-  void on_box(std::uint32_t body, const Pose& lower, const Pose& upper) {
+  void on_box(std::uint32_t body, const Pose& lower, const Pose& upper,
+              std::vector<ContactPoint>& points) const {
     const Vector3d up = rotation_of(lower) * Vector3d::UnitZ();
     for (int i = 0; i < 4; ++i) {
       const Vector3d at = to_world(upper, corner(i)), seen = to_body(lower, at);
       const bool over = std::fabs(seen.x()) <= 1.1 * half_.x() && std::fabs(seen.y()) <= 1.1 * half_.y();
       const double depth = half_.z() - seen.z();
       if (over && depth >= 0)
-        points_.push_back({body, body + 1, at, up, depth, static_cast<std::uint64_t>(i + 1)});
+        points.push_back({body, body + 1, at, up, depth, static_cast<std::uint64_t>(i + 1)});
     }
   }
 
   Vector3d normal_, half_;
-  std::vector<ContactPoint> points_;
+  double flicker_;
+  std::uint64_t calls_ = 0;
 };
 
-class BallsOnPlane : public ContactFinder {
+class BallsOnPlane : public AnalyticContacts {
  public:
   BallsOnPlane(const Vector3d& normal, double radius) : normal_(normal), radius_(radius) {}
 
-  const std::vector<ContactPoint>& find(std::span<const BodyPose> bodies, std::span<const std::uint8_t>,
-                                        std::span<const ObjectPair>) override {
-    points_.clear();
+ private:
+  void find_all(std::span<const BodyPose> bodies, std::vector<ContactPoint>& points) override {
     for (std::uint32_t i = 1; i < bodies.size(); ++i) {
       const Vector3d centre = to_world(bodies[i].pose, Vector3d::Zero());
       const double depth = radius_ - normal_.dot(centre);
-      if (depth >= 0) points_.push_back({0, i, centre - radius_ * normal_, normal_, depth, 1});
+      if (depth >= 0) points.push_back({0, i, centre - radius_ * normal_, normal_, depth, 1});
     }
-    return points_;
   }
+  double radius(std::uint32_t body) const override { return body == 0 ? kWide : radius_; }
 
- private:
   Vector3d normal_;
   double radius_;
-  std::vector<ContactPoint> points_;
 };
 
 }  // namespace
+
+std::vector<ObjectPair> PairJudge::kept(std::span<const ObjectPair> pairs, std::span<const BodyPose> bodies,
+                                        std::span<const double> radii, double tolerance) {
+  std::vector<ObjectPair> kept;
+  const std::vector<PosedBodies> before = std::exchange(posed_, {});
+  for (const ObjectPair& pair : pairs) {
+    const PosedBodies now = {pair, bodies[pair.a], bodies[pair.b]};
+    const auto then = std::ranges::lower_bound(before, pair, {}, &PosedBodies::pair);
+    const bool stays = then != before.end() && then->pair == pair &&
+                       is_kept(cube_of(radii[pair.a]), cube_of(radii[pair.b]), {then->a.pose, then->b.pose},
+                               {now.a.pose, now.b.pose}, tolerance);
+    if (stays) kept.push_back(pair);
+    posed_.push_back(stays ? *then : now);
+  }
+  return kept;
+}
+
+const std::vector<ContactPoint>& AnalyticContacts::find(std::span<const BodyPose> bodies,
+                                                        std::span<const std::uint8_t>,
+                                                        const Keeping& keeping) {
+  points_.clear();
+  find_all(bodies, points_);
+  std::vector<ObjectPair> pairs(keeping.remembered.begin(), keeping.remembered.end());
+  for (const ContactPoint& point : points_) pairs.push_back({point.body_a, point.body_b});
+  std::ranges::sort(pairs);
+  pairs.erase(std::ranges::unique(pairs).begin(), pairs.end());
+  std::vector<double> radii;
+  for (std::uint32_t i = 0; i < bodies.size(); ++i) radii.push_back(radius(i));
+  kept_ = judge_.kept(pairs, bodies, radii, keeping.tolerance);
+  return points_;
+}
 
 BodyProperties box_body(const Vector3d& size, double mass) {
   BodyProperties body;
@@ -121,8 +158,8 @@ BodyProperties fixed_body() {
   return body;
 }
 
-std::unique_ptr<ContactFinder> boxes_on_plane(const Vector3d& normal, const Vector3d& size) {
-  return std::make_unique<BoxesOnPlane>(normal, size);
+std::unique_ptr<ContactFinder> boxes_on_plane(const Vector3d& normal, const Vector3d& size, double flicker) {
+  return std::make_unique<BoxesOnPlane>(normal, size, flicker);
 }
 
 std::unique_ptr<ContactFinder> balls_on_plane(const Vector3d& normal, double radius) {

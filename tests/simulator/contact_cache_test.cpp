@@ -2,8 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
-#include <utility>
 
 #include "analytic_contacts.h"
 
@@ -20,12 +20,23 @@ struct BoxOnSlab {
   std::vector<BodyState> states = std::vector<BodyState>(2);
   ContactPoint contact = {0, 1, {0.25, 0, 0.5}, Vector3d::UnitZ(), 0.002, 7};
   ContactCache cache;
+  PairJudge judge;
 
   BoxOnSlab() { states[1].position.z() = 0.998; }
 
   std::vector<ContactPoint> step(const std::vector<ContactPoint>& found,
                                  std::span<const std::uint8_t> idle = {}) {
-    cache.update(found, cache.unmoved(bodies, states, kReach), bodies, states, idle, kGap);
+    std::vector<ObjectPair> pairs = cache.pairs();
+    for (const ContactPoint& point : found) pairs.push_back({point.body_a, point.body_b});
+    std::ranges::sort(pairs);
+    pairs.erase(std::ranges::unique(pairs).begin(), pairs.end());
+    std::vector<BodyPose> poses;
+    std::vector<double> radii;
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+      poses.push_back(pose_of(bodies[i], states[i]));
+      radii.push_back(bodies[i].radius);
+    }
+    cache.update(found, judge.kept(pairs, poses, radii, kReach), bodies, states, idle, kGap);
     return {cache.contacts().begin(), cache.contacts().end()};
   }
 
@@ -135,29 +146,6 @@ TEST(ContactCache, SlowMotionAddsUp) {
   EXPECT_EQ(steps, 4);
 }
 
-TEST(ContactCache, TurningIsMotionOfTheSmallerBodysFarthestPoint) {
-  const double radius = std::sqrt(3) / 2;
-  for (const std::uint32_t slab : {0, 1}) {
-    BoxOnSlab on;
-    if (slab == 1) {
-      std::swap(on.bodies[0], on.bodies[1]), std::swap(on.states[0], on.states[1]);
-      on.contact.normal = -on.contact.normal;
-    }
-    on.step({on.contact});
-    const auto keeps = [&](std::uint32_t body, double angle) {
-      on.states[body].orientation = Eigen::AngleAxisd(angle, Vector3d::UnitY());
-      const bool unmoved = !on.cache.unmoved(on.bodies, on.states, kReach).empty();
-      on.states[body].orientation.setIdentity();
-      return unmoved;
-    };
-    EXPECT_TRUE(keeps(1 - slab, 0.9 * kReach / radius));
-    EXPECT_FALSE(keeps(1 - slab, 1.1 * kReach / radius));
-    // Seen from a slab that turns, the box's centre moves too.
-    EXPECT_FALSE(keeps(slab, 0.9 * kReach / radius));
-    EXPECT_TRUE(keeps(slab, 0.9 * kReach / (radius + 0.998)));
-  }
-}
-
 TEST(ContactCache, PairsAreJudgedEachByItself) {
   BoxOnSlab on;
   on.bodies.push_back(on.bodies[1]), on.states.push_back(on.states[1]);
@@ -182,11 +170,9 @@ TEST(ContactCache, PairsThatSleepAreRememberedAsTheyWereWhateverIsFound) {
   on.step({on.contact});
   on.remember({3});
   const std::uint8_t idle[] = {1, 1};
-  on.states[1].position.z() += 0.01;
   EXPECT_TRUE(on.step({}, idle).empty());
   EXPECT_TRUE(on.step({on.contact, on.contact}, idle).empty());
-  on.states[1].position.z() -= 0.01;
-  EXPECT_EQ(on.step({}).size(), 1u);
+  ASSERT_EQ(on.step({}).size(), 1u);
   EXPECT_EQ(on.cache.impulses()[0].normal, 3);
 }
 
@@ -230,24 +216,8 @@ TEST(WarmStart, ImpulsesFollowFeaturesThenPlacesAndTheRestIsSharedOut) {
   EXPECT_EQ(matched[3].normal, 2);
 }
 
-// Finds the corners of a block at depths that jump by up to 0.8 mm from step to step.
-class FlickeringContacts : public ContactFinder {
- public:
-  const std::vector<ContactPoint>& find(std::span<const BodyPose> bodies, std::span<const std::uint8_t> idle,
-                                        std::span<const ObjectPair> unmoved) override {
-    points_ = corners_->find(bodies, idle, unmoved);
-    for (ContactPoint& point : points_) point.depth += kJump * static_cast<double>(++calls_ % 3);
-    return points_;
-  }
-
- private:
-  static constexpr double kJump = 4e-4;
-  std::unique_ptr<ContactFinder> corners_ = boxes_on_plane(Vector3d::UnitZ(), {1, 1, 1});
-  std::vector<ContactPoint> points_;
-  std::uint64_t calls_ = 0;
-};
-
-// Found anew in each step they keep it moving at 0.04 to 0.2 m/s.
+// Contacts whose depths jump by up to 0.8 mm, found anew in each step, keep a block moving at 0.04 to 0.2
+// m/s.
 TEST(ContactCache, ContactsThatFlickerDoNotShakeABlock) {
   for (const SolverKind solver :
        {SolverKind::automatic, SolverKind::soft, SolverKind::newton, SolverKind::sweeps}) {
@@ -256,7 +226,7 @@ TEST(ContactCache, ContactsThatFlickerDoNotShakeABlock) {
     std::vector<BodyProperties> bodies = {fixed_body(), box_body({1, 1, 1}, 1)};
     std::vector<BodyState> states(2);
     states[1].position.z() = 0.5 - options.solver.slop;
-    Simulator simulator(bodies, states, std::make_unique<FlickeringContacts>(), options);
+    Simulator simulator(bodies, states, boxes_on_plane(Vector3d::UnitZ(), {1, 1, 1}, 4e-4), options);
     double fastest = 0;
     for (int i = 0; i < 300; ++i) {
       const StepRecord record = simulator.step();

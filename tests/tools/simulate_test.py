@@ -67,6 +67,19 @@ class Runs(SimulateTest):
         self.assertLessEqual(energy[-1], energy[0] + 1e-3 * abs(energy[0]))
         self.assertTrue((run["frames/seconds/step"] > 0).all())
 
+    def test_pairs_that_keep_their_contacts_are_not_asked_about_unless_all_are(self):
+        self.stack("--frames", "60")
+        kept = datasets(self.run_file)
+        self.stack("--frames", "60", "--ask-all")
+        asked = datasets(self.run_file)
+        counted = {"frames/" + name for name in ("object_pairs", "block_pairs", "candidates", "triangle_pairs", "contact_ratio")}
+        for name in kept:
+            if "seconds" not in name and name not in counted:
+                self.assertTrue(np.array_equal(kept[name], asked[name]), name)
+        self.assertGreater(kept["frames/kept_pairs"][-1], 0)
+        self.assertEqual(kept["frames/object_pairs"][-1], 0)
+        self.assertGreater(asked["frames/object_pairs"][-1], 0)
+
     def test_threads_do_not_change_the_results(self):
         others = self.outputs / "others.h5"
         pile = [*self.cows(), "--count", "20", "--frames", "90", "--trajectory", "10"]
@@ -283,8 +296,7 @@ class Resuming(SimulateTest):
 
 class Frames(SimulateTest):
     def test_a_frame_is_a_scene_with_the_contacts_of_the_run(self):
-        self.simulate("pile", *self.cows(), "--count", "20", "--frames", "80", "--trajectory",
-                      "20")
+        self.simulate("pile", *self.cows(), "--count", "20", "--frames", "80", "--trajectory", "20", "--ask-all")
         for frame in (0, 60):
             scene = self.outputs / f"frame{frame}.h5"
             self.passes("frame", self.run_file, "--frame", str(frame), "-o", scene)

@@ -23,7 +23,7 @@ struct SimulateArguments : CommonArguments {
   std::uint32_t count = 0;
   double jitter = 0.0005, tilt = 30, density = 1000, gravity = 9.81, slop = -1, rolling_resistance = -1;
   std::uint64_t seed = 1;
-  bool fast = false, cold = false, continuous = false;
+  bool fast = false, ask_all = false, cold = false, continuous = false;
   SimulatorOptions simulator;
   RunOptions run;
 };
@@ -231,9 +231,10 @@ ExitCode run(const char* kind, SimulateArguments arguments, const SetUp& set_up)
   std::unique_ptr<ContinuousMotion> continuous;
   if (arguments.continuous)
     continuous = std::make_unique<ContinuousMotion>(start.shapes(), options.threads, start.filter);
-  Simulator simulator(start.bodies.bodies, start.bodies.states,
-                      make_mesh_contact_finder(std::move(engine), start.shapes(), options.threads), options,
-                      std::move(continuous));
+  Simulator simulator(
+      start.bodies.bodies, start.bodies.states,
+      make_mesh_contact_finder(std::move(engine), start.shapes(), options.threads, arguments.ask_all),
+      options, std::move(continuous));
   const RunResults results = run_simulation(simulator, description, start.reentry, arguments.run);
   print(arguments, report_of(kind, arguments, description, results));
   return kDone;
@@ -287,6 +288,8 @@ void add_run_options(Command command, SimulateArguments& arguments) {
       {required({"--frames", run.steps, "N", "steps to make", between(1, 1'000'000'000)}),
        {"--engine", arguments.engine, "NAME [tandem]", "what finds the triangles that meet", engine_defect},
        {"--fast", arguments.fast, "let the engine decide triangles in float32"},
+       {"--ask-all", arguments.ask_all,
+        "ask the engine about pairs that keep their contacts too; the results stay the same"},
        {"--density", arguments.density, "D [1000]", "of the bodies, in kg/m^3", between(1e-12, 1e12)},
        threads_option(arguments, "the results do"),
        {"--trajectory", run.trajectory_every, "K [0]", "keep the state after every K-th step; 0: none"},

@@ -173,6 +173,23 @@ public unsafe struct tandem_pair_options {
 }
 
 [StructLayout(LayoutKind.Sequential)]
+public unsafe struct tandem_moved_options {
+  public uint struct_size;
+  public uint reserved;
+  public double tolerance;
+  public double* tolerance_of_pair;
+  public UIntPtr tolerance_count;
+  public tandem_object_pair* pairs;
+  public UIntPtr pair_count;
+}
+
+[StructLayout(LayoutKind.Sequential)]
+public unsafe struct tandem_moved_counters {
+  public ulong object_pairs;
+  public ulong kept;
+}
+
+[StructLayout(LayoutKind.Sequential)]
 public unsafe struct tandem_contact_options {
   public uint struct_size;
   public uint mode;
@@ -210,7 +227,7 @@ public unsafe struct tandem_manifold_options {
   public uint struct_size;
   public uint most_points;
   public uint ignore_previous;
-  public uint reserved;
+  public uint keep;
 }
 
 [StructLayout(LayoutKind.Sequential)]
@@ -413,6 +430,7 @@ public unsafe struct tandem_counters {
   public tandem_distance_counters distances;
   public tandem_impact_counters impacts;
   public tandem_tolerance_counters verdicts;
+  public tandem_moved_counters moved;
 }
 
 public static unsafe class Native {
@@ -523,6 +541,7 @@ public static unsafe class Native {
   public const uint TANDEM_DISTANCES = 2;
   public const uint TANDEM_IMPACTS = 3;
   public const uint TANDEM_VERDICTS = 4;
+  public const uint TANDEM_MOVED = 5;
   public const uint TANDEM_EXACT = 0;
   public const uint TANDEM_FAST = 1;
   public const uint TANDEM_BOXES = 2;
@@ -575,6 +594,8 @@ public static unsafe class Native {
   [DllImport("tandem")] public static extern ulong tandem_scene_where(IntPtr scene);
   [DllImport("tandem")] public static extern tandem_object_pair* tandem_scene_pairs(IntPtr scene, uint question, UIntPtr* count);
   [DllImport("tandem")] public static extern uint tandem_scene_find_pairs(IntPtr scene, tandem_pair_options* options);
+  [DllImport("tandem")] public static extern uint tandem_scene_find_moved(IntPtr scene, tandem_moved_options* options);
+  [DllImport("tandem")] public static extern tandem_object_pair* tandem_scene_moved(IntPtr scene, UIntPtr* count);
   [DllImport("tandem")] public static extern uint tandem_scene_find_contacts(IntPtr scene, tandem_contact_options* options);
   [DllImport("tandem")] public static extern tandem_contact* tandem_scene_contacts(IntPtr scene, UIntPtr* count);
   [DllImport("tandem")] public static extern uint tandem_scene_find_manifolds(IntPtr scene, tandem_manifold_options* options);

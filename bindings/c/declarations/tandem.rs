@@ -110,6 +110,7 @@ pub const TANDEM_CONTACTS: u32 = 1;
 pub const TANDEM_DISTANCES: u32 = 2;
 pub const TANDEM_IMPACTS: u32 = 3;
 pub const TANDEM_VERDICTS: u32 = 4;
+pub const TANDEM_MOVED: u32 = 5;
 pub const TANDEM_EXACT: u32 = 0;
 pub const TANDEM_FAST: u32 = 1;
 pub const TANDEM_BOXES: u32 = 2;
@@ -336,6 +337,25 @@ pub struct tandem_pair_options {
 
 #[repr(C)]
 #[derive(Clone, Copy)]
+pub struct tandem_moved_options {
+    pub struct_size: u32,
+    pub reserved: u32,
+    pub tolerance: f64,
+    pub tolerance_of_pair: *const f64,
+    pub tolerance_count: usize,
+    pub pairs: *const tandem_object_pair,
+    pub pair_count: usize,
+}
+
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct tandem_moved_counters {
+    pub object_pairs: u64,
+    pub kept: u64,
+}
+
+#[repr(C)]
+#[derive(Clone, Copy)]
 pub struct tandem_contact_options {
     pub struct_size: u32,
     pub mode: u32,
@@ -376,7 +396,7 @@ pub struct tandem_manifold_options {
     pub struct_size: u32,
     pub most_points: u32,
     pub ignore_previous: u32,
-    pub reserved: u32,
+    pub keep: u32,
 }
 
 #[repr(C)]
@@ -599,6 +619,7 @@ pub struct tandem_counters {
     pub distances: tandem_distance_counters,
     pub impacts: tandem_impact_counters,
     pub verdicts: tandem_tolerance_counters,
+    pub moved: tandem_moved_counters,
 }
 
 #[link(name = "tandem")]
@@ -636,6 +657,8 @@ extern "C" {
     pub fn tandem_scene_where(scene: *const tandem_scene) -> u64;
     pub fn tandem_scene_pairs(scene: *const tandem_scene, question: u32, count: *mut usize) -> *const tandem_object_pair;
     pub fn tandem_scene_find_pairs(scene: *mut tandem_scene, options: *const tandem_pair_options) -> tandem_status;
+    pub fn tandem_scene_find_moved(scene: *mut tandem_scene, options: *const tandem_moved_options) -> tandem_status;
+    pub fn tandem_scene_moved(scene: *const tandem_scene, count: *mut usize) -> *const tandem_object_pair;
     pub fn tandem_scene_find_contacts(scene: *mut tandem_scene, options: *const tandem_contact_options) -> tandem_status;
     pub fn tandem_scene_contacts(scene: *const tandem_scene, count: *mut usize) -> *const tandem_contact;
     pub fn tandem_scene_find_manifolds(scene: *mut tandem_scene, options: *const tandem_manifold_options) -> tandem_status;

@@ -5,6 +5,8 @@ struct Same_tandem_triangle { using Ours = Triangle; using Theirs = tandem_trian
 struct Same_tandem_pose { using Ours = Pose; using Theirs = tandem_pose; TANDEM_SAME_SIZE(); TANDEM_SAME(rotation); TANDEM_SAME(translation); };
 struct Same_tandem_instance { using Ours = Instance; using Theirs = tandem_instance; TANDEM_SAME_SIZE(); TANDEM_SAME(asset); TANDEM_SAME(pose); };
 struct Same_tandem_object_pair { using Ours = ObjectPair; using Theirs = tandem_object_pair; TANDEM_SAME_SIZE(); TANDEM_SAME(a); TANDEM_SAME(b); };
+struct Same_tandem_moved_counters { using Ours = MovedCounters; using Theirs = tandem_moved_counters; TANDEM_SAME_SIZE(); TANDEM_SAME(object_pairs);
+  TANDEM_SAME(kept); };
 struct Same_tandem_contact { using Ours = Contact; using Theirs = tandem_contact; TANDEM_SAME_SIZE(); TANDEM_SAME(pair); TANDEM_SAME(triangle_a);
   TANDEM_SAME(triangle_b); TANDEM_SAME(face_a); TANDEM_SAME(face_b); };
 struct Same_tandem_contact_counters { using Ours = ContactCounters; using Theirs = tandem_contact_counters; TANDEM_SAME_SIZE();

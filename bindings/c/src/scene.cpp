@@ -32,6 +32,7 @@ struct tandem_scene : Allocated {
   Scene scene;
   bool pairs_found = false;
   Standing standing = Standing::none;
+  Asked<MovedQuery> moved;
   Asked<ContactQuery> contacts;
   Asked<ManifoldQuery> manifolds;
   Asked<ContainmentQuery> contained;
@@ -146,6 +147,14 @@ tandem_status read_options(const tandem_contact_options& given, ContactOptions& 
   return TANDEM_OK;
 }
 
+tandem_status read_options(const tandem_moved_options& given, MovedOptions& options) {
+  if (given.reserved != 0) return TANDEM_BAD_OPTION;
+  if (!is_there(given.tolerance_of_pair, given.tolerance_count)) return TANDEM_NULL_ARGUMENT;
+  options.tolerance = given.tolerance;
+  options.tolerance_of_pair = {given.tolerance_of_pair, given.tolerance_count};
+  return TANDEM_OK;
+}
+
 tandem_status read_options(const tandem_distance_options& given, DistanceOptions& options) {
   if (given.limit_reach > 1) return TANDEM_BAD_OPTION;
   if (!is_there(given.former, given.former_count)) return TANDEM_NULL_ARGUMENT;
@@ -212,9 +221,13 @@ tandem_status find(tandem_scene* scene, Asked<Query> tandem_scene::*question, co
 
 tandem_status find_manifolds(tandem_scene& self, const tandem_manifold_options* given) {
   ManifoldOptions options;
-  if (const tandem_status status = read_manifold_options(given, options); status != TANDEM_OK) return status;
-  if (self.standing == Standing::none) return TANDEM_CONTACTS_MISSING;
-  return self.told(self.manifolds.query.find(self.scene, self.contacts.query, options));
+  bool keep = false;
+  const tandem_status status = read_manifold_options(given, options, &keep);
+  if (status != TANDEM_OK) return status;
+  if (self.standing == Standing::none || (keep && !self.moved.found)) return TANDEM_CONTACTS_MISSING;
+  return self.told(keep
+                       ? self.manifolds.query.find(self.scene, self.moved.query, self.contacts.query, options)
+                       : self.manifolds.query.find(self.scene, self.contacts.query, options));
 }
 
 template <typename Query>
@@ -278,7 +291,7 @@ tandem_status tandem_scene_set_threads(tandem_scene* scene, uint32_t threads) {
 tandem_status tandem_scene_set_assets(tandem_scene* scene, tandem_asset* const* assets, size_t count) {
   return enter(scene, [&](tandem_scene& self) {
     self.forget_contacts();
-    self.pairs_found = self.distances.found = self.impacts.found = self.verdicts.found =
+    self.pairs_found = self.moved.found = self.distances.found = self.impacts.found = self.verdicts.found =
         self.bodies_at.found = false;
     // Points of before are not those of other assets.
     self.manifolds.query.forget_points();
@@ -361,6 +374,7 @@ uint64_t tandem_scene_where(const tandem_scene* scene) {
 const tandem_object_pair* tandem_scene_pairs(const tandem_scene* scene, uint32_t question, size_t* count) {
   std::span<const ObjectPair> pairs;
   if (scene != nullptr && question == TANDEM_PAIRS && scene->pairs_found) pairs = scene->scene.pairs();
+  if (scene != nullptr && question == TANDEM_MOVED) pairs = pairs_of(scene->moved);
   if (scene != nullptr && question == TANDEM_CONTACTS) pairs = pairs_of(scene->contacts);
   if (scene != nullptr && question == TANDEM_DISTANCES) pairs = pairs_of(scene->distances);
   if (scene != nullptr && question == TANDEM_IMPACTS) pairs = pairs_of(scene->impacts);
@@ -396,7 +410,10 @@ tandem_status tandem_scene_find_manifolds(tandem_scene* scene, const tandem_mani
   return enter(scene, [&](tandem_scene& self) {
     const tandem_status status = find_manifolds(self, options);
     self.manifolds.found = status == TANDEM_OK;
-    if (status != TANDEM_OK) self.manifolds.query.forget_points();
+    if (status != TANDEM_OK) {
+      self.manifolds.query.forget_points();
+      self.moved.query.forget_poses();
+    }
     return status;
   });
 }
@@ -425,6 +442,7 @@ tandem_status tandem_scene_find_contained(tandem_scene* scene) {
 TANDEM_SCENE_ROWS(contacts, tandem_contact)
 TANDEM_SCENE_ROWS(manifolds, tandem_manifold)
 TANDEM_SCENE_ROWS(contained, tandem_containment)
+TANDEM_SCENE_QUESTION(moved, tandem_moved_options, tandem_object_pair)
 TANDEM_SCENE_QUESTION(distances, tandem_distance_options, tandem_distance)
 TANDEM_SCENE_QUESTION(impacts, tandem_impact_options, tandem_impact)
 TANDEM_SCENE_QUESTION(verdicts, tandem_tolerance_options, tandem_verdict)
@@ -465,6 +483,7 @@ tandem_status tandem_scene_get_counters(const tandem_scene* scene, tandem_counte
   copy_counters(scene->distances, filled.distances);
   copy_counters(scene->impacts, filled.impacts);
   copy_counters(scene->verdicts, filled.verdicts);
+  copy_counters(scene->moved, filled.moved);
   return write_struct(filled, counters);
 }
 

@@ -112,14 +112,29 @@ class Scene {
                           counters_of(counters.contacts));
   }
 
-  nb::tuple manifolds(std::uint32_t most_points, bool match_previous) {
+  nb::tuple moved(double tolerance, nb::handle of_pair, nb::handle pairs) {
+    const Turn turn = take_turn();
+    const GivenPairs given(pairs);
+    std::vector<double> tolerances;
+    if (!of_pair.is_none()) tolerances = copy_rows<double>(of_pair);
+    auto options = sized<tandem_moved_options>();
+    options.tolerance = tolerance;
+    options.tolerance_of_pair = tolerances.data();
+    options.tolerance_count = tolerances.size();
+    given.put_into(options);
+    const nb::object found = answer<tandem_scene_find_moved, tandem_scene_moved>(options);
+    return nb::make_tuple(pairs_of(TANDEM_MOVED), found);
+  }
+
+  nb::tuple manifolds(std::uint32_t most_points, bool match_previous, bool keep) {
     const Turn turn = take_turn();
     find_missing_contacts();
     auto options = sized<tandem_manifold_options>();
     options.most_points = most_points;
     options.ignore_previous = !match_previous;
+    options.keep = keep;
     ask([&](tandem_scene* scene) { return tandem_scene_find_manifolds(scene, &options); });
-    return nb::make_tuple(pairs_of(TANDEM_CONTACTS), rows<tandem_scene_manifolds>(),
+    return nb::make_tuple(pairs_of(keep ? TANDEM_MOVED : TANDEM_CONTACTS), rows<tandem_scene_manifolds>(),
                           rows<tandem_scene_points>());
   }
 
@@ -250,6 +265,7 @@ void add_scenes(nb::module_& module) {
       .def("count", &Scene::count)
       .def("pairs", &Scene::pairs)
       .def("contacts", &Scene::contacts, none(), nb::arg(), nb::arg(), nb::arg(), nb::arg(), nb::arg())
+      .def("moved", &Scene::moved, nb::arg(), none(), none())
       .def("manifolds", &Scene::manifolds)
       .def("contained", &Scene::contained)
       .def("distances", &Scene::distances, none(), none(), nb::arg(), nb::arg(), none())

@@ -16,7 +16,7 @@ from ._asset import Asset, Level, Part
 from ._build import BuildReport, Mesh, build, read_mesh
 from ._errors import Error, FileError
 from ._rows import BODY_AT, CONTACT, CONTAINMENT, DISTANCE, FORMER, IMPACT, INSTANCE, MANIFOLD, MOTION, NO_INDEX, PAIR, POINT, VERDICT
-from ._scene import Contacts, Contained, Counters, Distances, Filter, Impacts, Manifolds, Scene, Verdicts
+from ._scene import Contacts, Contained, Counters, Distances, Filter, Impacts, Manifolds, Moved, Scene, Verdicts
 
 #: Says what moves a body (Filter): forces; nothing; the caller; nothing until the caller wakes it.
 MOVING, FIXED, KINEMATIC, SLEEPING = range(4)
@@ -50,5 +50,5 @@ __all__ = [
     "AMBIGUOUS", "APART", "CONTACT", "CONTAINMENT", "DISTANCE", "FIXED", "FORMER", "GOES_THROUGH", "IMPACT", "IMPACT_AT_START", "IMPACT_IN_STEP", "INSIDE", "INSTANCE",
     "KINEMATIC", "MANIFOLD", "MOTION", "MOVING", "NO_IMPACT", "NO_INDEX", "OPEN_CURVE", "OUTER_OPEN", "PAIR", "POINT", "SLEEPING", "TOUCH", "TOUCHING", "VERDICT",
     "WITHIN_TOLERANCE", "Asset", "BuildReport", "Contacts", "Contained", "Counters", "Distances", "Error", "FileError", "Filter", "Impacts", "Level", "Manifolds", "Mesh",
-    "Part", "Scene", "Verdicts", "build", "instances", "read_mesh", "rotations", "view",
+    "Moved", "Part", "Scene", "Verdicts", "build", "instances", "read_mesh", "rotations", "view",
 ]

@@ -14,7 +14,7 @@ from ._errors import Error
 from ._poses import explained
 from ._rows import BODY_AT, CONTACT, CONTAINMENT, DISTANCE, FORMER, IMPACT, INSTANCE, MANIFOLD, MOTION, PAIR, POINT, VERDICT
 
-__all__ = ["Contacts", "Contained", "Counters", "Distances", "Filter", "Impacts", "Manifolds", "Scene", "Verdicts"]
+__all__ = ["Contacts", "Contained", "Counters", "Distances", "Filter", "Impacts", "Manifolds", "Moved", "Scene", "Verdicts"]
 
 _frombuffer = np.frombuffer
 _MODES = {"exact": 0, "fast": 1, "boxes": 2}
@@ -53,6 +53,13 @@ class Contacts(NamedTuple):
         meets[self.contacts["pair"]] = True
         touching: Rows = self.pairs[meets]
         return touching
+
+
+class Moved(NamedTuple):
+    """Object pairs, and those of them that have moved, arrays of PAIR."""
+
+    pairs: Rows
+    moved: Rows
 
 
 class Manifolds(NamedTuple):
@@ -293,6 +300,26 @@ class Scene:
         """
         return _frombuffer(self._core.pairs(amount(reach, "reach", np.inf), flag(self_pairs, "self_pairs")), PAIR)
 
+    def moved(self, tolerance: npt.ArrayLike = 0.0, *, pairs: npt.ArrayLike | None = None) -> Moved:
+        """Finds the pairs that have moved since they last were rows of this question, or were not among the pairs of the call before. Contacts need only be asked
+        of these, as `manifolds(keep=True)` keeps the manifolds of the others.
+
+        Args:
+            tolerance: how far a point of the smaller body, seen from the larger one, may move; a number, or (m,) of them, one for each of `pairs`.
+
+        >>> scene = tandem.Scene([box], translation=[[0, 0, 0], [0.1, 0.2, 0.75], [0.2, 0, 1.5]])
+        >>> for _ in range(2):
+        ...     moved = scene.moved(0.001).moved
+        ...     found = scene.contacts(pairs=moved)
+        ...     print(len(moved), len(scene.manifolds(keep=True).manifolds))
+        2 2
+        0 2
+        """
+        tolerances = floats(tolerance, "tolerance")
+        each = tolerances.ndim != 0
+        found = self._core.moved(0.0 if each else float(tolerances), tolerances if each else None, None if pairs is None else pairs_of(pairs))
+        return Moved(_frombuffer(found[0], PAIR), _frombuffer(found[1], PAIR))
+
     def contacts(self, *, pairs: npt.ArrayLike | None = None, mode: Literal["exact", "fast", "boxes"] = "exact", first_contact_only: bool = False,
                  self_pairs: bool = False, within: float = 0.0, add_error_bounds: bool = False) -> Contacts:
         """Finds every pair of triangles that meet.
@@ -317,13 +344,15 @@ class Scene:
                                     flag(add_error_bounds, "add_error_bounds"))
         return Contacts(_frombuffer(found[0], PAIR), _frombuffer(found[1], CONTACT), Counters._make(found[2]))
 
-    def manifolds(self, *, most_points: int = 7, match_previous: bool = True) -> Manifolds:
+    def manifolds(self, *, most_points: int = 7, match_previous: bool = True, keep: bool = False) -> Manifolds:
         """Makes contact manifolds of the last `contacts`, or, where none were asked for since bodies were placed, moved, added or removed, of all contacts, which
         are found first. They need all contacts: with `first_contact_only` they are of the one triangle pair that was found.
 
         Args:
             most_points: of a manifold, 1 to 7.
             match_previous: points are looked for among those of the last call, and keep their `id`.
+            keep: the last `contacts` are of the pairs that have `moved`; the others keep the manifolds that they had, moved with the bodies, and rows are about
+                all pairs of `moved`.
 
         Raises:
             Error: the last `contacts` raised one; an asset has no topology.
@@ -332,7 +361,7 @@ class Scene:
         >>> manifolds["normal"].tolist(), manifolds["depth"].tolist(), len(points)
         ([[0.0, 0.0, 1.0]], [0.25], 4)
         """
-        pairs, manifolds, points = self._core.manifolds(whole_number(most_points, "most_points", 1, 7), flag(match_previous, "match_previous"))
+        pairs, manifolds, points = self._core.manifolds(whole_number(most_points, "most_points", 1, 7), flag(match_previous, "match_previous"), flag(keep, "keep"))
         return Manifolds(_frombuffer(pairs, PAIR), _frombuffer(manifolds, MANIFOLD), _frombuffer(points, POINT))
 
     def contained(self) -> Contained:

@@ -10,11 +10,6 @@
 namespace tandem::test {
 namespace {
 
-template <typename Element>
-bool same_bytes(std::span<const Element> x, std::span<const Element> y) {
-  return x.size() == y.size() && (x.empty() || std::memcmp(x.data(), y.data(), x.size_bytes()) == 0);
-}
-
 // A heap of bodies of many kinds.
 void fill(ManifoldScene& scene, std::uint64_t seed, int bodies) {
   RandomPoses random(seed);

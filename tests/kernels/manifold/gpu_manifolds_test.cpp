@@ -7,6 +7,8 @@
 #include "gpu/gpu_scene_fixture.h"
 #include "kernels/asked.h"
 #include "tandem/kernels/gpu_manifold_query.h"
+#include "tandem/kernels/gpu_moved_query.h"
+#include "tandem/kernels/gpu_scene.h"
 
 namespace tandem {
 namespace {
@@ -266,6 +268,226 @@ TEST_F(GpuManifolds, HaveFromOneToSevenPoints) {
   for (const std::uint32_t bad : {0u, kMostManifoldPoints + 1, 4000000000u})
     EXPECT_EQ(make(bad), Status::kBadOption) << bad;
   for (const std::uint32_t good : {1u, kMostManifoldPoints}) EXPECT_EQ(make(good), Status::kOk) << good;
+}
+
+/// Both sides of a scene whose manifolds are kept.
+class KeptOnBothSides {
+ public:
+  explicit KeptOnBothSides(const test::SampleAssets& assets)
+      : uploaded_(assets, {}, {}, Contents::manifolds) {
+    EXPECT_EQ(scene_.set_assets(assets.views()), Status::kOk);
+    EXPECT_EQ(gpu_moved_.set_assets(uploaded_.assets(), nullptr), Status::kOk);
+    EXPECT_EQ(gpu_query_.set_assets(uploaded_.assets(), nullptr), Status::kOk);
+    EXPECT_EQ(gpu_.set_assets(uploaded_.assets(), nullptr), Status::kOk);
+  }
+
+  Result on_cpu(const std::vector<Instance>& instances, const std::vector<ObjectPair>& pairs,
+                const MovedOptions& options, bool match_previous) {
+    EXPECT_EQ(scene_.place(instances), Status::kOk);
+    EXPECT_EQ(moved_.find(scene_, pairs, options), Status::kOk);
+    EXPECT_EQ(query_.find(scene_, moved_.rows(), {}), Status::kOk);
+    EXPECT_EQ(manifolds_.find(scene_, moved_, query_, {.match_previous = match_previous}), Status::kOk);
+    return {{manifolds_.rows().begin(), manifolds_.rows().end()},
+            {manifolds_.points().begin(), manifolds_.points().end()},
+            manifolds_.counters()};
+  }
+
+  /// What moved, on both sides.
+  void expect_same_moved() const {
+    const GpuMoved moved = gpu_moved_.moved();
+    const std::size_t pairs = moved_.pairs().size();
+    EXPECT_EQ(gpu_moved_.report().counters, moved_.counters());
+    EXPECT_TRUE(std::ranges::equal(download(moved.kept_rows, pairs), moved_.kept_rows()));
+    EXPECT_TRUE(std::ranges::equal(download(moved.moved.pairs, moved_.rows().size()), moved_.rows()));
+    EXPECT_EQ(download(moved.moved.count, 1)[0], moved_.rows().size());
+    const std::vector<PosedBodies> posed = download(moved.posed, pairs);
+    for (std::size_t i = 0; i < pairs; ++i) {
+      const PosedBodies &x = posed[i], &y = moved_.posed()[i];
+      EXPECT_EQ(x.pair, y.pair);
+      EXPECT_EQ(x.a.asset, y.a.asset);
+      EXPECT_EQ(std::memcmp(&x.a.pose, &y.a.pose, sizeof(Pose)), 0);
+      EXPECT_EQ(std::memcmp(&x.b.pose, &y.b.pose, sizeof(Pose)), 0);
+    }
+  }
+
+  /// Result: the number of pairs that are kept.
+  std::uint64_t step(const std::vector<Instance>& instances, const std::vector<ObjectPair>& pairs,
+                     double tolerance, bool match_previous = true, const std::vector<double>& of_pair = {}) {
+    const Result cpu = on_cpu(instances, pairs, {tolerance, of_pair}, match_previous);
+    const GpuScene scene(std::span<const AssetView>(), instances, pairs);
+    const auto tolerances = test::on_gpu(of_pair);
+    const GpuMovedOptions options = {tolerance, of_pair.empty() ? nullptr : tolerances.data()};
+    EXPECT_EQ(gpu_moved_.find(scene.instances(), scene.pairs(), options, nullptr), Status::kOk);
+    expect_same_moved();
+    const GpuMoved moved = gpu_moved_.moved();
+    EXPECT_EQ(gpu_query_.find_contacts(scene.instances(), moved.moved, test::grouped_options(), nullptr),
+              Status::kOk);
+    EXPECT_EQ(gpu_.make(scene.instances(), moved, gpu_query_, {.match_previous = match_previous}, nullptr),
+              Status::kOk);
+    EXPECT_LE(gpu_.bytes(), most_manifold_bytes(gpu_.capacity(), uploaded_.assets().size()));
+    EXPECT_LE(gpu_moved_.bytes(), most_moved_bytes(gpu_moved_.capacity(), uploaded_.assets().size()));
+    expect_same(cpu, result_of(gpu_));
+    return moved_.counters().kept;
+  }
+
+  GpuMovedQuery& gpu_moved() { return gpu_moved_; }
+  GpuContactQuery& gpu_query() { return gpu_query_; }
+  GpuManifoldQuery& gpu() { return gpu_; }
+
+ private:
+  Scene scene_;
+  MovedQuery moved_;
+  ContactQuery query_;
+  ManifoldQuery manifolds_;
+  GpuScene uploaded_;
+  GpuMovedQuery gpu_moved_;
+  GpuContactQuery gpu_query_;
+  GpuManifoldQuery gpu_;
+};
+
+/// A part of all pairs, in their order or in none.
+std::vector<ObjectPair> some_pairs(const std::vector<Instance>& instances, bool in_order,
+                                   test::RandomPoses& random) {
+  std::vector<ObjectPair> pairs = test::all_pairs(instances, false, random);
+  for (ObjectPair& pair : pairs) {
+    if (pair.b < pair.a) std::swap(pair.a, pair.b);
+  }
+  std::erase_if(pairs, [&](const ObjectPair&) { return random.below(10) == 0; });
+  if (!in_order) std::ranges::shuffle(pairs, random.engine());
+  return pairs;
+}
+
+TEST_F(GpuManifolds, ThatAreKeptAreTheCpus) {
+  for (const bool in_order : {true, false}) {
+    BodyScene scene = boxes(120, 4, 62);
+    test::RandomPoses random(63);
+    KeptOnBothSides both(scene.assets);
+    std::uint64_t kept = 0;
+    for (int step = 0; step < 10; ++step) {
+      const std::vector<ObjectPair> pairs = some_pairs(scene.instances, in_order, random);
+      std::vector<double> of_pair;
+      for (std::size_t i = 0; step == 6 && i < pairs.size(); ++i) of_pair.push_back(random.below(3) * 2e-3);
+      kept += both.step(scene.instances, pairs, step == 5 ? 0 : 3e-3, step != 4, of_pair);
+      if (HasFailure()) return;
+      if (step != 7) move(scene.instances, random, 5e-4);
+    }
+    EXPECT_GT(kept, 10'000u);
+  }
+}
+
+/// What does not fit is told, and after the retry pairs are kept nevertheless.
+TEST_F(GpuManifolds, ThatAreKeptStayWhenRoomGrows) {
+  BodyScene scene = boxes(60, 3, 64);
+  test::RandomPoses random(65);
+  KeptOnBothSides both(scene.assets);
+  std::vector<ObjectPair> pairs = test::all_pairs(scene.instances, false, random);
+  ASSERT_EQ(both.gpu_moved().reserve({.pairs = 1}), Status::kOk);
+  ASSERT_EQ(both.gpu().reserve({.pairs = 1, .contacts = 1, .manifolds = 1, .points = 1}), Status::kOk);
+  both.step(scene.instances, pairs, 0.1);
+  const std::vector<Instance> first = scene.instances;
+  for (Instance instance : first) {
+    instance.pose.translation[0] += 20;
+    scene.instances.push_back(instance);
+  }
+  pairs = test::all_pairs(scene.instances, false, random);
+  for (ObjectPair& pair : pairs) {
+    if (pair.b < pair.a) std::swap(pair.a, pair.b);
+  }
+  both.step(scene.instances, pairs, 0.1);
+  EXPECT_GT(both.step(scene.instances, pairs, 0.1), 1000u);
+}
+
+TEST_F(GpuManifolds, ThatAreKeptByAGraphThatIsReplayed) {
+  BodyScene scene = boxes(60, 3, 66);
+  test::RandomPoses random(67);
+  KeptOnBothSides both(scene.assets);
+  const std::vector<ObjectPair> pairs = test::all_pairs(scene.instances, false, random);
+  both.step(scene.instances, pairs, 0);
+  both.step(scene.instances, pairs, 0);
+  const GpuScene on_gpu(std::span<const AssetView>(), scene.instances, pairs);
+  test::GraphStream stream;
+  stream.capture([&] {
+    EXPECT_EQ(both.gpu_moved().enqueue(on_gpu.instances(), on_gpu.pairs(), {.tolerance = 1}, stream.get()),
+              Status::kOk);
+    const GpuMoved moved = both.gpu_moved().moved();
+    EXPECT_EQ(
+        both.gpu_query().enqueue(on_gpu.instances(), moved.moved, test::grouped_options(), stream.get()),
+        Status::kOk);
+    return both.gpu().enqueue(on_gpu.instances(), moved, both.gpu_query(), {}, stream.get());
+  });
+  for (int step = 0; step < 3; ++step) {
+    stream.launch();
+    const Result cpu = both.on_cpu(scene.instances, pairs, {.tolerance = 1}, true);
+    both.expect_same_moved();
+    EXPECT_EQ(both.gpu_moved().report().counters.kept, pairs.size());
+    expect_same(cpu, result_of(both.gpu()));
+  }
+}
+
+TEST_F(GpuManifolds, ThatTheCallBeforeDidNotReturnAreRefused) {
+  BodyScene scene = boxes(60, 3, 68);
+  test::RandomPoses random(69);
+  KeptOnBothSides both(scene.assets);
+  const std::vector<ObjectPair> pairs = test::all_pairs(scene.instances, false, random);
+  both.step(scene.instances, pairs, 1);
+  const GpuScene on_gpu(std::span<const AssetView>(), scene.instances, pairs);
+  const auto status = [&] {
+    const GpuMoved moved = both.gpu_moved().moved();
+    EXPECT_EQ(
+        both.gpu_query().find_contacts(on_gpu.instances(), moved.moved, test::grouped_options(), nullptr),
+        Status::kOk);
+    return both.gpu().make(on_gpu.instances(), moved, both.gpu_query(), {}, nullptr);
+  };
+  for (int call = 0; call < 2; ++call) {  // of one of them there are no manifolds
+    EXPECT_EQ(both.gpu_moved().find(on_gpu.instances(), on_gpu.pairs(), {.tolerance = 1}, nullptr),
+              Status::kOk);
+  }
+  EXPECT_EQ(status(), Status::kKeptMismatch);
+  EXPECT_EQ(both.gpu_moved().forget_poses(nullptr), Status::kOk);
+  EXPECT_EQ(both.gpu_moved().find(on_gpu.instances(), on_gpu.pairs(), {.tolerance = 1}, nullptr),
+            Status::kOk);
+  EXPECT_EQ(both.gpu_moved().report().counters.kept, 0u);
+  EXPECT_EQ(status(), Status::kOk);
+  EXPECT_EQ(both.gpu_moved().find(on_gpu.instances(), on_gpu.pairs(), {.tolerance = -1}, nullptr),
+            Status::kBadTolerance);
+}
+
+/// A scene that a GPU answers keeps what one on the CPU keeps.
+TEST_F(GpuManifolds, OfAGpuSceneAreKept) {
+  BodyScene bodies = boxes(80, 3, 70);
+  test::RandomPoses random(71);
+  tandem::GpuScene on_gpu;
+  Scene on_cpu;
+  struct Side {
+    Scene& scene;
+    MovedQuery moved;
+    ContactQuery query;
+    ManifoldQuery manifolds;
+
+    void step(const std::vector<Instance>& instances, double tolerance) {
+      ASSERT_EQ(scene.place(instances), Status::kOk);
+      ASSERT_EQ(moved.find(scene, {.tolerance = tolerance}), Status::kOk);
+      ASSERT_EQ(query.find(scene, moved.rows(), {}), Status::kOk);
+      ASSERT_EQ(manifolds.find(scene, moved, query), Status::kOk);
+    }
+    Result result() const {
+      return {{manifolds.rows().begin(), manifolds.rows().end()},
+              {manifolds.points().begin(), manifolds.points().end()},
+              manifolds.counters()};
+    }
+  };
+  Side cpu = {on_cpu, {}, {}, {}}, gpu = {on_gpu, {}, {}, {}};
+  ASSERT_EQ(on_cpu.set_assets(bodies.assets.views()), Status::kOk);
+  ASSERT_EQ(on_gpu.set_assets(bodies.assets.views()), Status::kOk);
+  for (int step = 0; step < 6 && !HasFailure(); ++step) {
+    const double tolerance = step == 4 ? INFINITY : 3e-3;
+    cpu.step(bodies.instances, tolerance);
+    gpu.step(bodies.instances, tolerance);
+    expect_same(cpu.result(), gpu.result());
+    EXPECT_EQ(cpu.moved.counters(), gpu.moved.counters());
+    EXPECT_EQ(step > 0, cpu.moved.counters().kept > 0);
+    move(bodies.instances, random, 5e-4);
+  }
 }
 
 TEST_F(GpuManifolds, NeedTopology) {

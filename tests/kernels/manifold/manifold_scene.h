@@ -1,6 +1,7 @@
 #pragma once
 #include <gtest/gtest.h>
 
+#include <cstring>
 #include <vector>
 
 #include "kernels/asked.h"
@@ -59,6 +60,11 @@ inline Pose turn(int axis, double angle) {
 
 inline Pose any_motion(RandomPoses& random, double reach) {
   return random.pose({.translation = reach});
+}
+
+template <typename Element>
+bool same_bytes(std::span<const Element> x, std::span<const Element> y) {
+  return x.size() == y.size() && (x.empty() || std::memcmp(x.data(), y.data(), x.size_bytes()) == 0);
 }
 
 class ManifoldScene {

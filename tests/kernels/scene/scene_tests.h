@@ -38,6 +38,9 @@ bool is_usable() {
 struct Questions {
   ContactQuery contacts;
   ManifoldQuery manifolds;
+  MovedQuery moved;
+  ContactQuery contacts_of_moved;
+  ManifoldQuery kept;  // of pairs that stand still; so they are what others find
   ContainmentQuery contained;
   DistanceQuery distances;
   ImpactQuery impacts;
@@ -58,6 +61,9 @@ struct Questions {
     ASSERT_EQ(distances.find(scene, {.reach = reach}), Status::kOk);
     ASSERT_EQ(manifolds.find(scene, contacts, {.match_previous = match_previous}), Status::kOk);
     ASSERT_EQ(contained.find(scene, contacts), Status::kOk);
+    ASSERT_EQ(moved.find(scene, {.tolerance = 5e-324}), Status::kOk);
+    ASSERT_EQ(contacts_of_moved.find(scene, moved.rows(), {}), Status::kOk);
+    ASSERT_EQ(kept.find(scene, moved, contacts_of_moved, {.match_previous = false}), Status::kOk);
   }
 };
 
@@ -90,6 +96,9 @@ inline void expect_same_answers(const Questions& here, const Questions& there) {
   expect_same_bytes(here.manifolds.rows(), there.manifolds.rows());
   expect_same_bytes(here.manifolds.points(), there.manifolds.points());
   EXPECT_EQ(here.manifolds.counters(), there.manifolds.counters());
+  EXPECT_TRUE(std::ranges::equal(here.kept.pairs(), there.kept.pairs()));
+  expect_same_bytes(here.kept.rows(), there.kept.rows());
+  expect_same_bytes(here.kept.points(), there.kept.points());
   EXPECT_TRUE(std::ranges::equal(here.contained.rows(), there.contained.rows()));
   EXPECT_EQ(here.contained.counters(), there.contained.counters());
   EXPECT_TRUE(std::ranges::equal(here.verdicts.rows(), there.verdicts.rows()));

@@ -69,7 +69,8 @@ TimedAnswer Engine::time_query(const TimedQuery& asked) {
   return answer;
 }
 
-void Engine::find(std::span<const BodyPose> bodies, std::span<const std::uint8_t> idle, ContactList& found) {
+void Engine::find(std::span<const BodyPose> bodies, std::span<const std::uint8_t> idle, ContactList& found,
+                  const PairChoice& choose) {
   times_ = {};
   counters_ = {};
   Stopwatch watch;
@@ -79,10 +80,11 @@ void Engine::find(std::span<const BodyPose> bodies, std::span<const std::uint8_t
   filter_.motion = idle.empty() ? nullptr : idle_motion_.data();
   set_filter(filter_);
   times_.update = watch.lap();
-  const std::span<const ObjectPair> pairs = find_pairs();
+  std::span<const ObjectPair> pairs = find_pairs();
+  if (choose) pairs = choose(pairs);
   found.pairs.assign(pairs.begin(), pairs.end());
   times_.broad_phase = watch.lap();
-  query(pairs);
+  query(found.pairs);
   times_.traversal = watch.lap() - times_.triangle_tests;
   if (!contacts(found.triangles)) throw std::logic_error("an engine that does not tell triangles");
   sort_contacts(found.triangles);

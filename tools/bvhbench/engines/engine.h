@@ -2,6 +2,7 @@
 #include <compare>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <span>
 #include <stdexcept>
@@ -208,10 +209,15 @@ class Engine {
   /// them.
   virtual TimedAnswer time_query(const TimedQuery& asked);
 
+  /// Chooses the pairs that are asked about, given those that were found; valid until the query is over.
+  using PairChoice = std::function<std::span<const ObjectPair>(std::span<const ObjectPair>)>;
+
   /// Finds what a simulator asks for: update(), find_pairs(), query() and contacts(), in the order of a
   /// ContactList. `idle`: empty, or for each body whether it does not move (1; else 0): pairs of two idle
-  /// bodies are left out of both lists. They take the place of the filter's motions.
-  void find(std::span<const BodyPose> bodies, std::span<const std::uint8_t> idle, ContactList& found);
+  /// bodies are not found. They take the place of the filter's motions. `choose`: null for all pairs; the
+  /// time that it takes counts as the broad phase's.
+  void find(std::span<const BodyPose> bodies, std::span<const std::uint8_t> idle, ContactList& found,
+            const PairChoice& choose = nullptr);
 
   /// Puts the distance of each pair into `distances`; it is 0 or less where bodies meet.
   virtual void find_distances(std::span<const ObjectPair> /*pairs*/, std::vector<double>& /*distances*/) {
@@ -241,7 +247,7 @@ class Engine {
   const EngineTimes& times() const { return times_; }
 
   /// Returns what the last query for contacts counted. Counts that an engine does not keep as Tandem does are
-  /// 0; after find(), object_pairs and contacts are always there.
+  /// 0; after find(), object_pairs, those that were asked about, and contacts are always there.
   const ContactCounters& counters() const { return counters_; }
 
   /// Returns what the engine counted in the last query, by names of its own.

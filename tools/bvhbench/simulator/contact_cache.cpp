@@ -27,21 +27,11 @@ double smaller_radius(const ObjectPair& pair, std::span<const BodyProperties> bo
   return std::min(bodies[pair.a].radius, bodies[pair.b].radius);
 }
 
-PairPose pair_pose(const ObjectPair& pair, std::span<const BodyProperties> bodies,
-                   std::span<const BodyState> states) {
-  const bool first_is_smaller = bodies[pair.a].radius < bodies[pair.b].radius;
-  const BodyState& smaller = states[first_is_smaller ? pair.a : pair.b];
-  const BodyState& larger = states[first_is_smaller ? pair.b : pair.a];
-  return {into_body(larger, smaller.position), larger.orientation.conjugate() * smaller.orientation};
-}
-
-CachedContact cached(const ContactPoint& contact, const PairPose& found_at,
-                     std::span<const BodyState> states) {
+CachedContact cached(const ContactPoint& contact, std::span<const BodyState> states) {
   return {pair_of(contact),
           contact.feature,
           anchor_of(contact, states),
           states[contact.body_a].orientation.conjugate() * contact.normal,
-          found_at,
           0,
           {}};
 }
@@ -121,23 +111,15 @@ class PairMatch {
 
 }  // namespace
 
-std::vector<ObjectPair> ContactCache::unmoved(std::span<const BodyProperties> bodies,
-                                              std::span<const BodyState> states, double reach) const {
+std::vector<ObjectPair> ContactCache::pairs() const {
   std::vector<ObjectPair> pairs;
-  for (std::span<const CachedContact> rest = entries_; !rest.empty();) {
-    const ObjectPair pair = pair_of(rest.front());
-    const PairPose& then = rest.front().found_at;
-    const PairPose now = pair_pose(pair, bodies, states);
-    // A point's way is at most that of the centre and an arc about it.
-    const double way = (now.translation - then.translation).norm() +
-                       smaller_radius(pair, bodies) * now.rotation.angularDistance(then.rotation);
-    if (way <= reach) pairs.push_back(pair);
-    rest = rest.subspan(head_of(rest, pair).size());
+  for (const CachedContact& entry : entries_) {
+    if (pairs.empty() || pairs.back() != entry.pair) pairs.push_back(entry.pair);
   }
   return pairs;
 }
 
-void ContactCache::update(std::span<const ContactPoint> found, std::span<const ObjectPair> unmoved,
+void ContactCache::update(std::span<const ContactPoint> found, std::span<const ObjectPair> kept,
                           std::span<const BodyProperties> bodies, std::span<const BodyState> states,
                           std::span<const std::uint8_t> idle, double gap) {
   const std::vector<CachedContact> before = std::move(entries_);
@@ -155,20 +137,20 @@ void ContactCache::update(std::span<const ContactPoint> found, std::span<const O
       entries_.insert(entries_.end(), old.begin(), old.end());
       continue;
     }
-    if (std::binary_search(unmoved.begin(), unmoved.end(), pair)) {
+    if (std::binary_search(kept.begin(), kept.end(), pair)) {
       for (const CachedContact& entry : old) add(entry, moved_with_bodies(entry, states));
     } else {
-      renew(old, fresh, pair_pose(pair, bodies, states), states, gap, smaller_radius(pair, bodies));
+      renew(old, fresh, states, gap, smaller_radius(pair, bodies));
     }
   }
 }
 
 void ContactCache::renew(std::span<const CachedContact> old, std::span<const ContactPoint> found,
-                         const PairPose& now, std::span<const BodyState> states, double gap, double radius) {
+                         std::span<const BodyState> states, double gap, double radius) {
   constexpr double kNear = 0.02, kMatches = 0.1;  // of the smaller body's radius
   const double near = kNear * radius;
   const std::size_t first = entries_.size(), first_contact = contacts_.size();
-  for (const ContactPoint& contact : found) add(cached(contact, now, states), contact);
+  for (const ContactPoint& contact : found) add(cached(contact, states), contact);
   for (CachedContact entry : old) {
     const ContactPoint moved = moved_with_bodies(entry, states);
     const auto is_near = [&](const ContactPoint& one) {
@@ -176,7 +158,7 @@ void ContactCache::renew(std::span<const CachedContact> old, std::span<const Con
     };
     const auto others = std::span(contacts_).subspan(first_contact);
     if (!is_just_lost(entry, moved, states, gap, near) || std::ranges::any_of(others, is_near)) continue;
-    entry.found_at = now, entry.impulse = {};
+    entry.impulse = {};
     add(entry, moved);
   }
   PairMatch match(old, std::span(entries_).subspan(first));

@@ -10,40 +10,29 @@
 
 namespace tandem::simulation {
 
-/// The pose of the smaller of two bodies in the frame of the larger, about their centres of mass.
-struct PairPose {
-  Eigen::Vector3d translation;
-  Eigen::Quaterniond rotation;
-};
-
 /// A contact of a step and its impulse, as the next step needs them.
 struct CachedContact {
   ObjectPair pair;
   std::uint64_t feature;
   ContactAnchor anchor;
   Eigen::Vector3d normal_in_a;  ///< the normal, in a's frame
-  PairPose found_at;  ///< when contacts of the pair were last found, the same for all of the pair; the
-                      ///< above is of when this contact was
-  std::uint32_t quiet_steps;  ///< since it was found or last pushed
-  ContactImpulse impulse;     ///< of the last step
+  std::uint32_t quiet_steps;    ///< since it was found or last pushed
+  ContactImpulse impulse;       ///< of the last step
 };
 
-/// Remembers the contacts of a step and their impulses. Pairs that have not moved by more than a given reach
-/// keep their contacts: contacts of meshes change with every triangle that comes or goes, and found anew in
-/// each step they would shake what rests. The others start from the impulses of the step before.
+/// Remembers the contacts of a step and their impulses. Pairs that have not moved keep their contacts:
+/// contacts of meshes change with every triangle that comes or goes, and found anew in each step they would
+/// shake what rests. The others start from the impulses of the step before.
 class ContactCache {
  public:
-  /// The pairs whose contacts stay what they are: since these were found no point of the smaller body has
-  /// moved against the larger by more than `reach`, >= 0, by the bound of the centre's way and the arc that
-  /// the turn makes at the body's radius. Ascending.
-  std::vector<ObjectPair> unmoved(std::span<const BodyProperties> bodies, std::span<const BodyState> states,
-                                  double reach) const;
+  /// Returns the pairs whose contacts are remembered, ascending.
+  std::vector<ObjectPair> pairs() const;
 
-  /// Makes the contacts of a step. Unmoved pairs have those remembered, moved with the bodies; these may have
-  /// become gaps. All others have those found, and those just lost: remembered ones that are gaps of at most
-  /// `gap` along the normal, slid by at most a fiftieth of the smaller body's radius, with no other contact
-  /// of the pair that near, for at most eight steps since they pushed. Without these a body that comes off by
-  /// a hair falls freely for a whole step, and deeper than it was.
+  /// Makes the contacts of a step. Pairs that are kept have those remembered, moved with the bodies; these
+  /// may have become gaps. All others have those found, and those just lost: remembered ones that are gaps of
+  /// at most `gap` along the normal, slid by at most a fiftieth of the smaller body's radius, with no other
+  /// contact of the pair that near, for at most eight steps since they pushed. Without these a body that
+  /// comes off by a hair falls freely for a whole step, and deeper than it was.
   ///
   /// These contacts start with the impulse of the remembered one of the pair that has the same feature, or
   /// else of the nearest one within a tenth of the smaller body's radius; each is given once. What then is
@@ -51,8 +40,8 @@ class ContactCache {
   /// none, so that a pair pushes as it did although its points have changed.
   ///
   /// Pairs of two idle bodies stay remembered and are left out. Conditions: found comes by ascending pair;
-  /// unmoved is unmoved()'s answer for these states; idle is empty or has an entry for each body; gap >= 0.
-  void update(std::span<const ContactPoint> found, std::span<const ObjectPair> unmoved,
+  /// kept is ascending; idle is empty or has an entry for each body; gap >= 0.
+  void update(std::span<const ContactPoint> found, std::span<const ObjectPair> kept,
               std::span<const BodyProperties> bodies, std::span<const BodyState> states,
               std::span<const std::uint8_t> idle, double gap);
 
@@ -73,7 +62,7 @@ class ContactCache {
 
  private:
   // Makes the contacts of a pair that moved of those found and those just lost.
-  void renew(std::span<const CachedContact> old, std::span<const ContactPoint> found, const PairPose& now,
+  void renew(std::span<const CachedContact> old, std::span<const ContactPoint> found,
              std::span<const BodyState> states, double gap, double radius);
   void add(const CachedContact& entry, const ContactPoint& contact);
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <new>
 
 #include "common/stopwatch.h"
@@ -24,27 +25,49 @@ void throw_unless_ok(Status status, const Scene& scene) {
 
 class MeshContactFinder : public ContactFinder {
  public:
-  MeshContactFinder(std::unique_ptr<Engine> engine, std::span<const AssetView> shapes, std::uint32_t threads)
-      : engine_(std::move(engine)), threads_(threads) {
+  MeshContactFinder(std::unique_ptr<Engine> engine, std::span<const AssetView> shapes, std::uint32_t threads,
+                    bool asks_all)
+      : engine_(std::move(engine)), threads_(threads), asks_all_(asks_all) {
     engine_->set_threads(threads);
     engine_->set_shapes(shapes);
     generator_.set_shapes(shapes);
   }
 
   const std::vector<ContactPoint>& find(std::span<const BodyPose> bodies, std::span<const std::uint8_t> idle,
-                                        std::span<const ObjectPair> unmoved) override {
-    engine_->find(bodies, idle, found_);
+                                        const Keeping& keeping) override {
+    engine_->find(bodies, idle, found_, [&](std::span<const ObjectPair> near) {
+      const std::span<const ObjectPair> moved = find_moved(near, bodies, keeping);
+      return asks_all_ ? near : moved;
+    });
     Stopwatch stopwatch;
-    const std::vector<ContactPoint>& points = generator_.generate(found_, bodies, unmoved, threads_);
-    report_ = {engine_->times(), stopwatch.lap(), engine_->counters(), generator_.statistics()};
+    const std::vector<ContactPoint>& points = generator_.generate(found_, bodies, kept_, threads_);
+    report_ = {engine_->times(), stopwatch.lap(), engine_->counters(), generator_.statistics(), kept_.size()};
     return points;
   }
 
+  std::span<const PosedBodies> posed() const override { return generator_.posed(); }
+  void resume(std::span<const PosedBodies> posed) override { generator_.resume(posed); }
+
  private:
+  // Remembered pairs may keep a gap, with which their boxes no longer meet.
+  std::span<const ObjectPair> find_moved(std::span<const ObjectPair> near, std::span<const BodyPose> bodies,
+                                         const Keeping& keeping) {
+    pairs_.clear();
+    std::ranges::set_union(near, keeping.remembered, std::back_inserter(pairs_));
+    const MovedQuery& moved = generator_.find_moved(pairs_, bodies, keeping.tolerance, threads_);
+    kept_.clear();
+    for (std::size_t i = 0; i < pairs_.size(); ++i) {
+      if (moved.kept_rows()[i] != kNoIndex) kept_.push_back(pairs_[i]);
+    }
+    return moved.rows();
+  }
+
   std::unique_ptr<Engine> engine_;
   ContactGenerator generator_;
   std::uint32_t threads_;
+  bool asks_all_;
   ContactList found_;
+  std::vector<ObjectPair> pairs_;
 };
 
 }  // namespace
@@ -71,6 +94,23 @@ void ContactGenerator::set_shapes(std::span<const AssetView> shapes) {
   throw_unless_ok(scene_.set_assets(shapes), scene_);
 }
 
+void ContactGenerator::place(std::span<const BodyPose> bodies, std::uint32_t threads) {
+  throw_unless_ok(scene_.set_threads(threads), scene_);
+  throw_unless_ok(scene_.place(bodies), scene_);
+}
+
+const MovedQuery& ContactGenerator::find_moved(std::span<const ObjectPair> pairs,
+                                               std::span<const BodyPose> bodies, double tolerance,
+                                               std::uint32_t threads) {
+  place(bodies, threads);
+  throw_unless_ok(moved_.find(scene_, pairs, {.tolerance = tolerance}), scene_);
+  return moved_;
+}
+
+void ContactGenerator::resume(std::span<const PosedBodies> posed) {
+  throw_unless_ok(moved_.resume(scene_, posed), scene_);
+}
+
 const std::vector<ContactPoint>& ContactGenerator::generate(const ContactList& found,
                                                             std::span<const BodyPose> bodies,
                                                             std::span<const ObjectPair> left_out,
@@ -84,8 +124,7 @@ const std::vector<ContactPoint>& ContactGenerator::generate(const ContactList& f
   }
   // The solvers remember by themselves what a point did in the step before.
   const ManifoldOptions options = {.match_previous = false};
-  throw_unless_ok(scene_.set_threads(threads), scene_);
-  throw_unless_ok(scene_.place(bodies), scene_);
+  place(bodies, threads);
   throw_unless_ok(manifolds_.find(scene_, found.pairs, contacts_, options), scene_);
   points_.clear();
   statistics_ = {manifolds_.counters(), 0, 0};
@@ -103,8 +142,8 @@ const std::vector<ContactPoint>& ContactGenerator::generate(const ContactList& f
 
 std::unique_ptr<ContactFinder> make_mesh_contact_finder(std::unique_ptr<Engine> engine,
                                                         std::span<const AssetView> shapes,
-                                                        std::uint32_t threads) {
-  return std::make_unique<MeshContactFinder>(std::move(engine), shapes, threads);
+                                                        std::uint32_t threads, bool asks_all) {
+  return std::make_unique<MeshContactFinder>(std::move(engine), shapes, threads, asks_all);
 }
 
 }  // namespace tandem::simulation

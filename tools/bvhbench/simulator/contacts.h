@@ -7,6 +7,7 @@
 
 #include "rigid_body.h"
 #include "tandem/kernels/manifold_query.h"
+#include "tandem/kernels/moved_query.h"
 
 namespace tandem::simulation {
 
@@ -58,6 +59,14 @@ class ContactGenerator {
   /// the generator's use.
   void set_shapes(std::span<const AssetView> shapes);
 
+  /// Finds which of these pairs have moved by more than a tolerance, see MovedQuery.
+  const MovedQuery& find_moved(std::span<const ObjectPair> pairs, std::span<const BodyPose> bodies,
+                               double tolerance, std::uint32_t threads);
+
+  /// Lets the next call of find_moved() go on from these.
+  void resume(std::span<const PosedBodies> posed);
+  std::span<const PosedBodies> posed() const { return moved_.posed(); }
+
   /// The points come by ascending pair of bodies, those of the pairs `left_out` not at all. Valid until the
   /// next call. Conditions: `found` is an engine's answer for these bodies; left_out is ascending.
   const std::vector<ContactPoint>& generate(const ContactList& found, std::span<const BodyPose> bodies,
@@ -67,7 +76,10 @@ class ContactGenerator {
   const ContactStatistics& statistics() const { return statistics_; }
 
  private:
+  void place(std::span<const BodyPose> bodies, std::uint32_t threads);
+
   Scene scene_;
+  MovedQuery moved_;
   ManifoldQuery manifolds_;
   std::vector<Contact> contacts_;
   std::vector<ContactPoint> points_;
@@ -80,6 +92,13 @@ struct FinderReport {
   double generation = 0;  ///< seconds for making points of triangle pairs
   ContactCounters counters;
   ContactStatistics contacts;
+  std::uint64_t kept_pairs = 0;
+};
+
+/// Says which pairs keep the contacts that they have.
+struct Keeping {
+  std::span<const ObjectPair> remembered;  ///< whose contacts the caller remembers, ascending
+  double tolerance;  ///< a pair keeps them until it has moved by more than this, see MovedQuery
 };
 
 /// A simulator has its contacts from one of these.
@@ -87,24 +106,34 @@ class ContactFinder {
  public:
   virtual ~ContactFinder() = default;
 
-  /// The contacts of bodies that stand like this, by ascending pair of bodies; pairs of two idle ones and
-  /// those of `unmoved` may be left out. Valid until the next call. Conditions: idle is empty or has an entry
-  /// for each body; unmoved is ascending.
+  /// The contacts of bodies that stand like this, by ascending pair of bodies; those of kept() are left out,
+  /// and those of two idle bodies may be. Valid until the next call. Condition: idle is empty or has an entry
+  /// for each body.
   virtual const std::vector<ContactPoint>& find(std::span<const BodyPose> bodies,
                                                 std::span<const std::uint8_t> idle,
-                                                std::span<const ObjectPair> unmoved) = 0;
+                                                const Keeping& keeping) = 0;
+
+  /// Returns the pairs of the last call that keep the contacts that they had: whose boxes meet, or that were
+  /// remembered. Ascending.
+  std::span<const ObjectPair> kept() const { return kept_; }
+
+  /// Return what the next call takes the motion of pairs from, and let it go on from there.
+  virtual std::span<const PosedBodies> posed() const = 0;
+  virtual void resume(std::span<const PosedBodies> posed) = 0;
 
   /// Returns the report of the last call.
   const FinderReport& report() const { return report_; }
 
  protected:
   FinderReport report_;
+  std::vector<ObjectPair> kept_;
 };
 
 /// Contacts of meshes: a collision engine finds the triangles that meet, and points are made of them. What
-/// the shapes look at must outlive it.
+/// the shapes look at must outlive it. asks_all: the engine is asked about pairs that are kept too, so that
+/// its times and counters are of all pairs.
 std::unique_ptr<ContactFinder> make_mesh_contact_finder(std::unique_ptr<Engine> engine,
                                                         std::span<const AssetView> shapes,
-                                                        std::uint32_t threads);
+                                                        std::uint32_t threads, bool asks_all = false);
 
 }  // namespace tandem::simulation

@@ -34,6 +34,24 @@ struct Stored<Eigen::Quaterniond> {
   }
 };
 
+/// The rotation row by row, then the translation.
+template <>
+struct Stored<Pose> {
+  using Number = double;
+  static constexpr std::size_t kWidth = 12;
+  static void append(std::vector<double>& numbers, const Pose& pose) {
+    for (const auto& row : pose.rotation) numbers.insert(numbers.end(), row, row + 3);
+    numbers.insert(numbers.end(), pose.translation, pose.translation + 3);
+  }
+  static Pose at(const std::vector<double>& numbers, std::size_t i) {
+    Pose pose;
+    const double* next = &numbers[kWidth * i];
+    for (auto& row : pose.rotation) std::copy_n(next, 3, row), next += 3;
+    std::copy_n(next, 3, pose.translation);
+    return pose;
+  }
+};
+
 }  // namespace tandem::bench
 
 namespace tandem::simulation {
@@ -59,6 +77,7 @@ void for_each_column(const StepRecord&, const Visit& visit) {
   visit("/frames/seconds/solver", &StepRecord::solver_seconds);
   visit("/frames/seconds/step", &StepRecord::step_seconds);
   visit("/frames/object_pairs", &StepRecord::object_pairs);
+  visit("/frames/kept_pairs", &StepRecord::kept_pairs);
   visit("/frames/block_pairs", &StepRecord::block_pairs);
   visit("/frames/candidates", &StepRecord::candidates);
   visit("/frames/triangle_pairs", &StepRecord::triangle_pairs);
@@ -104,10 +123,6 @@ void for_each_column(const CachedContact&, const Visit& visit) {
   visit("/state/contacts/normal_in_a", &CachedContact::normal_in_a);
   visit(
       "/state/contacts/depth", [](auto& c) -> auto& { return c.anchor.depth; });
-  visit(
-      "/state/contacts/found_at_translation", [](auto& c) -> auto& { return c.found_at.translation; });
-  visit(
-      "/state/contacts/found_at_rotation", [](auto& c) -> auto& { return c.found_at.rotation; });
   visit("/state/contacts/quiet_steps", &CachedContact::quiet_steps);
   visit(
       "/state/contacts/normal_impulse", [](auto& c) -> auto& { return c.impulse.normal; });
@@ -115,6 +130,19 @@ void for_each_column(const CachedContact&, const Visit& visit) {
       "/state/contacts/tangential_impulse", [](auto& c) -> auto& { return c.impulse.tangential; });
   visit(
       "/state/contacts/turning_impulse", [](auto& c) -> auto& { return c.impulse.turning; });
+}
+
+template <typename Visit>
+void for_each_column(const PosedBodies&, const Visit& visit) {
+  visit("/state/pairs/pair", &PosedBodies::pair);
+  visit(
+      "/state/pairs/shape_a", [](auto& posed) -> auto& { return posed.a.asset; });
+  visit(
+      "/state/pairs/shape_b", [](auto& posed) -> auto& { return posed.b.asset; });
+  visit(
+      "/state/pairs/pose_a", [](auto& posed) -> auto& { return posed.a.pose; });
+  visit(
+      "/state/pairs/pose_b", [](auto& posed) -> auto& { return posed.b.pose; });
 }
 
 template <typename Row>
@@ -195,6 +223,7 @@ void write_state(Hdf5Output& file, const SimulatorState& state) {
   file.add("/state/quiet_seconds", {bodies}, state.quiet);
   file.add("/state/sleeping_group", {bodies}, state.groups);
   write_rows(file, std::span(state.contacts));
+  write_rows(file, std::span(state.posed));
 }
 
 SimulatorState read_state(const Hdf5Input& file, const std::string& path, std::size_t bodies) {
@@ -205,6 +234,7 @@ SimulatorState read_state(const Hdf5Input& file, const std::string& path, std::s
   state.groups = file.read_u32("/state/sleeping_group");
   if (!read_rows(file, state.contacts))
     throw FileError(path + ": /state/contacts: datasets of different lengths");
+  if (!read_rows(file, state.posed)) throw FileError(path + ": /state/pairs: datasets of different lengths");
   const bool fits = alike && step.size() == 1 && state.states.size() == bodies &&
                     state.quiet.size() == bodies && state.groups.size() == bodies;
   if (!fits) throw FileError(path + ": /state: not of " + std::to_string(bodies) + " bodies");
@@ -216,6 +246,7 @@ SimulatorState read_state(const Hdf5Input& file, const std::string& path, std::s
     throw FileError(path + ": /state/contacts/pair: not ascending");
   require_finite(path, std::span<const BodyState>(state.states));
   require_finite(path, std::span<const CachedContact>(state.contacts));
+  require_finite(path, std::span<const PosedBodies>(state.posed));
   state.step = step[0];
   return state;
 }

@@ -15,6 +15,7 @@ void take(StepRecord& record, const FinderReport& report) {
   record.transfer_seconds = report.engine.transfer;
   record.contact_seconds = report.generation;
   record.object_pairs = report.counters.object_pairs;
+  record.kept_pairs = report.kept_pairs;
   record.block_pairs = report.counters.block_pairs;
   record.candidates = report.counters.candidates;
   record.triangle_pairs = report.counters.contacts;
@@ -61,12 +62,12 @@ StepRecord Simulator::step_in_arena() {
 void Simulator::find_contacts(StepRecord& record) {
   constexpr double kFall = 2;  // times what gravity lets a body fall in a step
   const std::vector<std::uint8_t> idle = this->idle();
-  const std::vector<ObjectPair> unmoved = cache_.unmoved(bodies_, states_, options_.solver.slop);
-  const std::vector<ContactPoint>& found = finder_->find(poses(), idle, unmoved);
+  const std::vector<ObjectPair> remembered = cache_.pairs();
+  const std::vector<ContactPoint>& found = finder_->find(poses(), idle, {remembered, options_.solver.slop});
   take(record, finder_->report());
   Stopwatch stopwatch;
   const double gap = kFall * options_.gravity.norm() * options_.dt * options_.dt;
-  cache_.update(found, unmoved, bodies_, states_, idle, gap);
+  cache_.update(found, finder_->kept(), bodies_, states_, idle, gap);
   record.contact_seconds += stopwatch.lap();
   record.contacts = cache_.contacts().size();
   for (const ContactPoint& contact : cache_.contacts()) {
@@ -145,11 +146,13 @@ void Simulator::place(std::uint32_t body, const BodyState& state) {
 
 SimulatorState Simulator::save() const {
   const auto entries = cache_.entries();
+  const auto posed = finder_->posed();
   const auto quiet = sleep_.quiet();
   const auto groups = sleep_.groups();
   return {step_,
           states_,
           {entries.begin(), entries.end()},
+          {posed.begin(), posed.end()},
           {quiet.begin(), quiet.end()},
           {groups.begin(), groups.end()}};
 }
@@ -158,6 +161,7 @@ void Simulator::restore(SimulatorState state) {
   step_ = state.step;
   states_ = std::move(state.states);
   cache_.restore(std::move(state.contacts));
+  finder_->resume(state.posed);
   sleep_.restore(std::move(state.quiet), std::move(state.groups));
   update_acting();
 }

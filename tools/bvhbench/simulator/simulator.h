@@ -22,7 +22,7 @@ struct StepRecord {
   double update_seconds = 0, broad_phase_seconds = 0, traversal_seconds = 0, triangle_test_seconds = 0,
          transfer_seconds = 0, contact_seconds = 0, solver_seconds = 0, step_seconds = 0;
 
-  std::uint64_t object_pairs = 0, block_pairs = 0, candidates = 0, triangle_pairs = 0;
+  std::uint64_t object_pairs = 0, kept_pairs = 0, block_pairs = 0, candidates = 0, triangle_pairs = 0;
   std::uint64_t segments = 0, patches = 0, open_curves = 0, contacts = 0;
   std::uint64_t islands = 0, newton_islands = 0, sleeping = 0, reentered = 0;
 
@@ -51,6 +51,7 @@ struct SimulatorState {
   std::uint64_t step = 0;
   std::vector<BodyState> states;
   std::vector<CachedContact> contacts;
+  std::vector<PosedBodies> posed;     ///< of the contact finder
   std::vector<double> quiet;          ///< of Sleep
   std::vector<std::uint32_t> groups;  ///< of Sleep
 };

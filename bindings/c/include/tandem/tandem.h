@@ -426,7 +426,14 @@ TANDEM_API uint64_t tandem_scene_where(const tandem_scene* scene);
 /// TANDEM_OUT_OF_MEMORY, TANDEM_CANNOT_START_THREAD.
 
 /// The questions that are about object pairs. Manifolds and contained bodies are about those of contacts.
-enum { TANDEM_PAIRS = 0, TANDEM_CONTACTS = 1, TANDEM_DISTANCES = 2, TANDEM_IMPACTS = 3, TANDEM_VERDICTS = 4 };
+enum {
+  TANDEM_PAIRS = 0,
+  TANDEM_CONTACTS = 1,
+  TANDEM_DISTANCES = 2,
+  TANDEM_IMPACTS = 3,
+  TANDEM_VERDICTS = 4,
+  TANDEM_MOVED = 5
+};
 
 /// The object pairs of a question: sorted, a < b, or a = b for self pairs, where the scene found them; as
 /// given else. Null and 0 where there is no such question.
@@ -444,6 +451,30 @@ typedef struct tandem_pair_options {
 /// Finds the object pairs whose world boxes overlap, or are within reach of each other, so that the caller
 /// can leave some out before asking about them. Result: TANDEM_BAD_REACH where reach is negative or NaN.
 TANDEM_API tandem_status tandem_scene_find_pairs(tandem_scene* scene, const tandem_pair_options* options);
+
+/// ---- Pairs that have moved
+
+typedef struct tandem_moved_options {
+  uint32_t struct_size;
+  uint32_t reserved;
+  double tolerance;                 ///< how far a point of the smaller body may move against the larger one
+  const double* tolerance_of_pair;  ///< or null: one for each pair instead
+  size_t tolerance_count;
+  const tandem_object_pair* pairs;  ///< or null
+  size_t pair_count;
+} tandem_moved_options;
+
+typedef struct tandem_moved_counters {
+  uint64_t object_pairs, kept;
+} tandem_moved_counters;
+
+/// Finds the pairs that have moved by more than the tolerance since they last were rows, or were not among
+/// the pairs of the call before. Contacts need only be asked of these: the manifolds of the others can be
+/// kept (tandem_manifold_options::keep). Result: TANDEM_BAD_TOLERANCE where a tolerance is negative or NaN,
+/// and `where` is the pair; TANDEM_BAD_OPTION where there are not as many as pairs.
+TANDEM_API tandem_status tandem_scene_find_moved(tandem_scene* scene, const tandem_moved_options* options);
+/// Returns the pairs that have moved, in the order of the question's pairs.
+TANDEM_API const tandem_object_pair* tandem_scene_moved(const tandem_scene* scene, size_t* count);
 
 /// ---- Contacts
 
@@ -492,7 +523,9 @@ typedef struct tandem_manifold_options {
   uint32_t struct_size;
   uint32_t most_points;      ///< of a manifold, 1 to 7, else TANDEM_BAD_OPTION; 0: 7
   uint32_t ignore_previous;  ///< 1: points are not looked for among those of the last call
-  uint32_t reserved;
+  uint32_t keep;  ///< 1: the contacts are those of tandem_scene_moved(); manifolds of pairs that have not
+                  ///< moved are the ones that were found, moved with the bodies (docs/contacts.md), and
+                  ///< tandem_manifold::pair is a row of the pairs of TANDEM_MOVED
 } tandem_manifold_options;
 
 enum { TANDEM_TOUCHING = 1, TANDEM_OPEN_CURVE = 2, TANDEM_GOES_THROUGH = 4, TANDEM_AMBIGUOUS = 8 };
@@ -531,7 +564,9 @@ typedef struct tandem_manifold_counters {
 
 /// Makes contact manifolds of the contacts, which are those of all bodies as they stand: else
 /// TANDEM_CONTACTS_MISSING. Needs topology of all assets: TANDEM_NO_TOPOLOGY, where tandem_scene_where() is
-/// the asset. After an error the next call finds no points before it.
+/// the asset. After an error the next call finds no points before it, and with `keep` the next
+/// tandem_scene_find_moved() keeps nothing. TANDEM_KEPT_MISMATCH: with `keep`, if the contacts are of other
+/// pairs, or the call before had no `keep`.
 TANDEM_API tandem_status tandem_scene_find_manifolds(tandem_scene* scene,
                                                      const tandem_manifold_options* options);
 /// Return the manifolds by ascending pair, and their points, manifold by manifold. Both are gone when
@@ -736,6 +771,7 @@ typedef struct tandem_counters {
   tandem_distance_counters distances;
   tandem_impact_counters impacts;
   tandem_tolerance_counters verdicts;
+  tandem_moved_counters moved;
 } tandem_counters;
 
 TANDEM_API tandem_status tandem_scene_get_counters(const tandem_scene* scene, tandem_counters* counters);

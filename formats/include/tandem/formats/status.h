@@ -71,7 +71,7 @@ enum class [[nodiscard]] Status : std::uint32_t{
     kPoseNotRigid,      ///< not a rotation and a translation, to kRigidTolerance
     kTooManyInstances,  ///< 2^32 - 1 or more
     kTooManyPairs,      ///< 2^32 - 1 object pairs or more
-    kKeptMismatch,      ///< fixed instances are kept of a list of another length
+    kKeptMismatch,      ///< what is kept is of other instances or pairs than the question
     kMotionMismatch,    ///< not as many motions as instances
     kCannotStartThread = 5,
     kNoOrientedBlocks = 209,  ///< exact queries on a GPU need them, and the asset was given without

@@ -4,6 +4,7 @@
 
 #include "tandem/kernels/contact_query.h"
 #include "tandem/kernels/manifold.h"
+#include "tandem/kernels/moved_query.h"
 
 namespace tandem {
 
@@ -33,6 +34,24 @@ class ManifoldQuery : public Answer<Manifold, ManifoldCounters> {
   /// device.
   Status find(Scene& scene, const ContactQuery& contacts, const ManifoldOptions& options = {});
 
+  /// Makes the manifolds of the contacts of the pairs that have moved, and puts those of the pairs that are
+  /// kept between them: rows and pairs() are about moved.pairs(). `contacts` are those of moved.rows(), and
+  /// name these.
+  ///
+  /// A kept manifold is that of the pose where it was found, moved with the bodies: normal and area_vector
+  /// turn with the larger body, in_a and in_b stay, position and centre go the mean way of the two bodies,
+  /// and depths are measured anew between in_a and in_b, less than 0 where the bodies have come apart. Flags,
+  /// ids and the number and order of points stay. Where neither body has moved, all bytes but indices do. A
+  /// kept pair without manifolds still has none.
+  ///
+  /// Result: as above, where where() counts rows of `moved`; also kKeptMismatch: the scene does not stand as
+  /// it did for `moved`, the contacts are not of its rows, or pairs are kept whose manifolds the call before
+  /// did not return, because it was not about moved.call_before().
+  Status find(Scene& scene, const MovedQuery& moved, const ContactQuery& contacts,
+              const ManifoldOptions& options = {});
+  Status find(Scene& scene, const MovedQuery& moved, std::span<const Contact> contacts,
+              const ManifoldOptions& options = {});
+
   /// The points of the manifolds, manifold by manifold. Valid as the rows.
   std::span<const ManifoldPoint> points() const { return points_.view(); }
 
@@ -40,11 +59,16 @@ class ManifoldQuery : public Answer<Manifold, ManifoldCounters> {
   void forget_points();
 
  private:
+  /// What is asked: contacts of pairs, and the questions that found them, or null.
+  struct Asked {
+    std::span<const ObjectPair> pairs;
+    std::span<const Contact> contacts;
+    const ContactQuery* query;
+    const MovedQuery* moved;
+  };
   struct State;
-  Status ask(Scene& scene, std::span<const ObjectPair> pairs, std::span<const Contact> contacts,
-             const ContactQuery* query, const ManifoldOptions& options);
-  Status answer(SceneState& scene, State& state, std::span<const Contact> contacts,
-                const ManifoldOptions& options);
+  Status ask(Scene& scene, const Asked& asked, const ManifoldOptions& options);
+  Status answer(SceneState& scene, State& state, const Asked& asked, const ManifoldOptions& options);
 
   Kept<State> state_;
   Buffer<ManifoldPoint> points_;

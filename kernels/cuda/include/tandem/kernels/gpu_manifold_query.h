@@ -3,6 +3,7 @@
 #include <cstdint>
 
 #include "tandem/kernels/gpu_contact_query.h"
+#include "tandem/kernels/gpu_moved_query.h"
 #include "tandem/kernels/manifold_query.h"
 
 namespace tandem {
@@ -24,13 +25,14 @@ struct GpuManifoldCapacity {
 /// GPU memory that an object with room for so much, of so many assets, holds at most.
 constexpr std::size_t most_manifold_bytes(const GpuManifoldCapacity& capacity, std::size_t assets) {
   constexpr std::size_t kFixed = std::size_t{1} << 20;
-  return kFixed + 128 * assets + 200 * std::size_t{capacity.pairs} + 180 * capacity.contacts +
-         3076 * std::size_t{capacity.manifolds} + 208 * std::size_t{capacity.points};
+  return kFixed + 128 * assets + 232 * std::size_t{capacity.pairs} + 180 * capacity.contacts +
+         3220 * std::size_t{capacity.manifolds} + 272 * std::size_t{capacity.points};
 }
 
 /// The outcome of a call.
 struct GpuManifoldReport {
-  Status status;           ///< that of the query, kOk or an error; or kOutOfRange: a pair of 2^27 contacts
+  Status status;           ///< that of the query, kOk or an error; kOutOfRange: a pair of 2^27 contacts; or
+                           ///< kKeptMismatch: see ManifoldQuery
   std::uint32_t complete;  ///< 0 where something did not fit, or the query was not complete: then there are
                            ///< no manifolds
   GpuManifoldCapacity
@@ -58,6 +60,13 @@ class GpuManifoldQuery : public GpuAssetQuestion<GpuManifoldCapacity, GpuManifol
   /// Makes manifolds of a contact query that has ended, and waits for them. Result: also kOutOfRange where
   /// that query is not complete.
   Status make(const GpuInstances& instances, const GpuPairs& pairs, const GpuContactQuery& query,
+              const GpuManifoldOptions& options, cudaStream_t stream);
+
+  /// Do the same where pairs are kept: `query` is about moved.moved, and rows are about moved.pairs, as those
+  /// of ManifoldQuery. The last call is remembered whatever the options say.
+  Status enqueue(const GpuInstances& instances, const GpuMoved& moved, const GpuContactQuery& query,
+                 const GpuManifoldOptions& options, cudaStream_t stream);
+  Status make(const GpuInstances& instances, const GpuMoved& moved, const GpuContactQuery& query,
               const GpuManifoldOptions& options, cudaStream_t stream);
 
   /// Return report().manifolds manifolds and report().points points. They are in the order of ManifoldQuery

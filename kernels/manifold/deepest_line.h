@@ -103,11 +103,11 @@ class DeepestLine {
                              const double& enough);
 
  private:
-  TANDEM_HD int follow_lines_through(const Vector3* points, int count, double reach, double& depth);
+  TANDEM_HD_CALLED int follow_lines_through(const Vector3* points, int count, double reach, double& depth);
   TANDEM_HD void search_from_seeds(const double& enough);
   TANDEM_HD_CALLED bool goes_on_elsewhere() const;
   TANDEM_HD_CALLED bool look_around(const Vector3& middle, double reach);
-  TANDEM_HD void begin_half_spaces(const Vector3& middle, double reach);
+  TANDEM_HD_CALLED void begin_half_spaces(const Vector3& middle, double reach);
   TANDEM_HD_CALLED void learn(int side, const Crossing& surface, HalfSpace& out) const;
   /// Forgets half-spaces beyond which the bodies go on, up to these heights on a line.
   TANDEM_HD void go_beyond(const Vector2& at, const double (&height)[2]) {
@@ -171,8 +171,8 @@ TANDEM_HD void DeepestLine<Team>::find_seeds(const Vector3& middle, double reach
 /// Follows the lines along the normal through points of the overlap, LineMemory::kMost / 2 at most. Result:
 /// the point on whose line the bodies overlap most, -1 if they overlap on none. depth: how much that is.
 template <typename Team>
-TANDEM_HD int DeepestLine<Team>::follow_lines_through(const Vector3* points, int count, double reach,
-                                                      double& depth) {
+TANDEM_HD_CALLED int DeepestLine<Team>::follow_lines_through(const Vector3* points, int count, double reach,
+                                                             double& depth) {
   LineQuestion* const line = shared_.lines.line;
   LineQuestions questions(bodies_, line);
   team_.sync();  // all have read the answers before
@@ -310,7 +310,7 @@ TANDEM_HD void DeepestLine<Team>::propose(int seed) {
 
 /// Begins with the triangles that the lines through the seeds met, and those of the pieces beside them.
 template <typename Team>
-TANDEM_HD void DeepestLine<Team>::begin_half_spaces(const Vector3& middle, double reach) {
+TANDEM_HD_CALLED void DeepestLine<Team>::begin_half_spaces(const Vector3& middle, double reach) {
   double far = 0;
   for (int side = 0; side < 2; ++side) {
     const Body& body = bodies_[side];

@@ -502,7 +502,7 @@ __global__ void __launch_bounds__(kThreads) remember(const __grid_constant__ Man
     };
     copy(args.manifolds, args.manifolds_before, std::uint64_t{state.last_manifolds} * kManifoldWords);
     copy(args.points, args.points_before, std::uint64_t{state.last_points} * kPointWords);
-    for (std::uint32_t i = first; i < state.last_manifolds; i += step) {
+    for (std::uint32_t i = first; state.last_matches != 0 && i < state.last_manifolds; i += step) {
       const PairEntry entry = args.entries[i];
       if (entry.points != 0) enter(args.table, args.table_size, table_step, entry);
     }

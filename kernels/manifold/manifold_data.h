@@ -77,8 +77,9 @@ struct ManifoldState {
   std::uint64_t moved_call;   ///< of GpuMovedQuery, that what was found last is of, or 0
   std::uint64_t call_before;  ///< the same of what lies in the arrays `before`
   std::uint32_t last_pairs;
-  std::uint32_t step;      ///< of the table
-  std::uint32_t has_last;  ///< the last call made manifolds that the next one is to remember
+  std::uint32_t step;          ///< of the table
+  std::uint32_t has_last;      ///< the last call made manifolds that the next one is to remember
+  std::uint32_t last_matches;  ///< ManifoldArgs::matches of that call: else the next finds no points in it
   std::uint32_t last_manifolds, last_points;
   GpuManifoldReport report;
 };

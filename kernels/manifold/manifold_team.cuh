@@ -109,7 +109,8 @@ class LineWalks {
       }
     }
     const std::uint32_t inner = __ballot_sync(kWarp, passes && !is_leaf),
-                        leaf = __ballot_sync(kWarp, passes && is_leaf);  // all have taken theirs
+                        leaf = __ballot_sync(kWarp, passes && is_leaf);
+    __syncwarp();  // all have taken theirs
     blocks_ -= taken;
     if (passes && is_leaf) {
       const std::uint32_t place = leaves + __popc(leaf & before);
@@ -138,6 +139,7 @@ class LineWalks {
         questions_.take(question, crossing);
       __syncwarp();
     }
+    __syncwarp();  // all have taken theirs
     return leaves < 32 ? 0 : leaves - 32;
   }
 

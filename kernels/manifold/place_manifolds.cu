@@ -76,6 +76,7 @@ __device__ void write_report(const ManifoldArgs& args, std::uint32_t manifolds, 
   state.last_pairs = complete ? pair_count(args) : 0;
   state.moved_call = keeps ? args.moved.call->call : 0;
   state.has_last = complete && args.match_previous ? 1 : 0;
+  state.last_matches = args.matches ? 1 : 0;
 }
 
 __device__ void place_tile(const ManifoldArgs& args, std::uint32_t tile, std::uint32_t pairs) {

@@ -72,8 +72,8 @@ class CurvePlaces {
   /// Finds the places of least values; of several that of the least triangles. values_of(piece, at, value):
   /// where each is on the piece, and how much.
   template <int kCount, typename ValuesOf>
-  TANDEM_HD_CALLED void least_places(std::uint32_t begin, std::uint32_t end, Place (&out)[kCount],
-                                     const ValuesOf& values_of) const;
+  TANDEM_HD void least_places(std::uint32_t begin, std::uint32_t end, Place (&out)[kCount],
+                              const ValuesOf& values_of) const;
 
   const Team& team_;
   const PieceMemory& memory_;
@@ -137,8 +137,8 @@ TANDEM_HD Vector3 CurvePlaces<Team>::nearest_on(const Piece& piece, const Vector
 
 template <typename Team>
 template <int kCount, typename ValuesOf>
-TANDEM_HD_CALLED void CurvePlaces<Team>::least_places(std::uint32_t begin, std::uint32_t end,
-                                                      Place (&out)[kCount], const ValuesOf& values_of) const {
+TANDEM_HD void CurvePlaces<Team>::least_places(std::uint32_t begin, std::uint32_t end, Place (&out)[kCount],
+                                               const ValuesOf& values_of) const {
   double least[kCount], value[kCount];
   LeastPiece own[kCount];
   Vector3 at[kCount];

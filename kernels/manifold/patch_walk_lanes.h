@@ -50,11 +50,6 @@ TANDEM_INLINE void leaves_of(const Block& block, std::uint32_t (&index)[kNodesPe
     index[i] = block.kind[i] == NodeKind::leaf ? block.index[i] : block.index[0];
 }
 
-template <int kCount>
-TANDEM_INLINE DoubleLanes<kCount> extent(const Vector3Lanes<kCount>& x) {
-  return magnitude_of<kCount>(x.x) + magnitude_of<kCount>(x.y) + magnitude_of<kCount>(x.z);
-}
-
 class LineWalk {
  public:
   LineWalk(const manifold::Body& body, const manifold::PatchFrame& frame,
@@ -184,13 +179,12 @@ class LineWalk {
     leaves_of(block, index);
     Vector3Lanes<4> corner[3];
     for (int k = 0; k < 3; ++k) corner[k] = posed_corner(body_, index, k) - frame_.origin;
-    const Vector3Lanes<4> first_edge = corner[1] - corner[0], second_edge = corner[2] - corner[0];
-    const Vector3Lanes<4> normal = cross(first_edge, second_edge);
-    const D area = dot(frame_.n, normal), size = magnitude_of<4>(area);
+    const Vector3Lanes<4> normal = cross(corner[1] - corner[0], corner[2] - corner[0]);
+    const D area = dot(frame_.n, normal), size = magnitude_of<4>(area), square = dot(normal, normal);
     const DoubleMask<4> turned = -__builtin_convertvector(turned_lanes(body_, index), DoubleMask<4>);
     const DoubleMask<4> upwards = turned ^ (area > 0);  // not turned: a positive area faces along the normal
-    const DoubleMask<4> steep = area * area > (least_sine_ * least_sine_) * dot(normal, normal);
-    const D little = 1e-12 * size + 0x1p-48 * body_.reach * (extent(first_edge) + extent(second_edge));
+    const DoubleMask<4> steep = area * area > (least_sine_ * least_sine_) * square;
+    const D little = 1e-12 * size + 0x1p-48 * body_.reach * square_root(square_root(square));
     const D sign = area > 0 ? D{} + 1.0 : D{} - 1.0;
     D u[3], v[3], height_of[3];
     for (int k = 0; k < 3; ++k) {

@@ -259,20 +259,18 @@ class LineQuestions {
     const Triangle stored = body.shape->triangles[t];
     Vector3 corner[3];
     for (int k = 0; k < 3; ++k) corner[k] = body.posed(stored.corner[k]) - frame.origin;
-    const Vector3 first_edge = corner[1] - corner[0], second_edge = corner[2] - corner[0];
-    const Vector3 normal = cross(first_edge, second_edge);
-    const double area = dot(frame.n, normal), size = std::fabs(area);
+    const Vector3 normal = cross(corner[1] - corner[0], corner[2] - corner[0]);
+    const double area = dot(frame.n, normal), size = std::fabs(area), square = dot(normal, normal);
     const bool turned = is_turned(body.shape->topology[t].flags);
     const int facing = (area > 0) != turned ? 1 : -1;
-    if (q.facing * facing < 0 || !(area * area > (q.least_sine * q.least_sine) * dot(normal, normal)))
-      return {};
+    if (q.facing * facing < 0 || !(area * area > (q.least_sine * q.least_sine) * square)) return {};
     Vector2 side[3];
     for (int k = 0; k < 3; ++k) side[k] = Vector2{dot(frame.u, corner[k]), dot(frame.v, corner[k])} - q.at;
     // Shares of the corners, times the area. What lies on an edge, or beside it by no more than rounding of
     // posed points and a little of the triangle, belongs to both triangles: no line slips through.
     const double first = cross(side[1], side[2]), second = cross(side[2], side[0]),
                  third = cross(side[0], side[1]);
-    const double little = 1e-12 * size + 0x1p-48 * body.reach * (extent(first_edge) + extent(second_edge));
+    const double little = 1e-12 * size + 0x1p-48 * body.reach * std::sqrt(std::sqrt(square));
     const double sign = area > 0 ? 1 : -1;
     if (!(sign * first >= -little && sign * second >= -little && sign * third >= -little)) return {};
     const double height = (first * dot(frame.n, corner[0]) + second * dot(frame.n, corner[1]) +
@@ -290,9 +288,6 @@ class LineQuestions {
   }
 
  private:
-  TANDEM_HD static double extent(const Vector3& x) {
-    return std::fabs(x.x) + std::fabs(x.y) + std::fabs(x.z);
-  }
   TANDEM_HD static bool is_nearer(const LineQuestion& q, const Crossing& crossing) {
     const double distance = std::fabs(crossing.height - q.target);
     return distance < q.nearest || (distance == q.nearest && crossing.triangle < q.best.triangle);

@@ -206,8 +206,14 @@ class LineWalk {
       unsigned found = bits_of_mask(within) & facing;
       if (found == 0) continue;
       const D height = (first * height_of[0] + second * height_of[1] + third * height_of[2]) / area;
-      for (; found != 0; found &= found - 1)
-        take(i, height[std::countr_zero(found)], index[std::countr_zero(found)]);
+      for (; found != 0; found &= found - 1) {
+        const int n = std::countr_zero(found);
+        manifold::Vector2 side[3];
+        double of[3], at = height[n];
+        for (int k = 0; k < 3; ++k) side[k] = {x[k][n], y[k][n]}, of[k] = height_of[k][n];
+        if (manifold::LineQuestions::keep_on_triangle(side, of, 0x1p-46 * body_.reach, at))
+          take(i, at, index[n]);
+      }
     }
   }
 

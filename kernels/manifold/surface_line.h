@@ -273,9 +273,9 @@ class LineQuestions {
     const double little = 1e-12 * size + 0x1p-48 * body.reach * std::sqrt(std::sqrt(square));
     const double sign = area > 0 ? 1 : -1;
     if (!(sign * first >= -little && sign * second >= -little && sign * third >= -little)) return {};
-    const double height = (first * dot(frame.n, corner[0]) + second * dot(frame.n, corner[1]) +
-                           third * dot(frame.n, corner[2])) /
-                          area;
+    const double of[3] = {dot(frame.n, corner[0]), dot(frame.n, corner[1]), dot(frame.n, corner[2])};
+    double height = (first * of[0] + second * of[1] + third * of[2]) / area;
+    if (!keep_on_triangle(side, of, 0x1p-46 * body.reach, height)) return {};
     const bool is_asked = height >= q.lower && height <= q.upper && is_nearer(q, {height, t});
     return is_asked ? Crossing{height, t} : Crossing{};
   }
@@ -285,6 +285,20 @@ class LineQuestions {
     if (!is_nearer(q, crossing)) return;
     q.nearest = std::fabs(crossing.height - q.target), q.best = crossing;
     q.reach = lesser(q.reach, static_cast<float>(q.nearest) + q.slack);
+  }
+
+  /// Far from the origin, where rounding is much of a triangle that the line grazes, its shares are known
+  /// badly: the line meets it only where its box is, give or take `rounding`, so that every walk looks there.
+  /// corner: from the line on, across it; of: heights of the corners.
+  TANDEM_HD static bool keep_on_triangle(const Vector2 (&corner)[3], const double (&of)[3], double rounding,
+                                         double& height) {
+    const auto least = [](double p, double q, double r) { return lesser(lesser(p, q), r); };
+    const auto greatest = [](double p, double q, double r) { return greater(greater(p, q), r); };
+    height = lesser(greater(height, least(of[0], of[1], of[2])), greatest(of[0], of[1], of[2]));
+    return least(corner[0].x, corner[1].x, corner[2].x) <= rounding &&
+           greatest(corner[0].x, corner[1].x, corner[2].x) >= -rounding &&
+           least(corner[0].y, corner[1].y, corner[2].y) <= rounding &&
+           greatest(corner[0].y, corner[1].y, corner[2].y) >= -rounding;
   }
 
  private:

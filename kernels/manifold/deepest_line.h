@@ -362,7 +362,7 @@ template <typename Team>
 TANDEM_HD OverlapLine DeepestLine<Team>::line_that_counts(int from, bool& is_loose) const {
   const LineQuestion* const line = shared_.lines.line;
   const LineOfTwo& p = shared_.proposed;
-  const double within = kNearEnd * bodies_.reach();
+  const double within = kNearEnd * bodies_.smaller_diagonal() + 16 * bodies_.tolerance();
   double part = 1;
   int blocked = -1;
   for (int side = 0; side < 2; ++side) {
@@ -398,7 +398,8 @@ TANDEM_HD OverlapLine DeepestLine<Team>::line_that_counts(int from, bool& is_loo
                                : shared_.spaces.nearest_triangle(team_, side, p.at, p.height[side], within);
     }
   }
-  return out;
+  // What the search ends early for must not become less.
+  return out.depth() > shared_.best.depth() ? out : OverlapLine();
 }
 
 /// Adds the half-spaces of what the lines met; false if all were known.
@@ -469,7 +470,10 @@ TANDEM_HD_CALLED void DeepestLine<Team>::go_to_ends() {
     OverlapLine& best = shared_.best;
     for (int side = 0; side < 2; ++side) {
       const Crossing& end = line[side].best;
-      if (end.found()) best.height[side] = end.height, best.triangle[side] = end.triangle;
+      if (!end.found()) continue;
+      best.triangle[side] = end.triangle;
+      best.height[side] =
+          side == 0 ? greater(end.height, best.height[side]) : lesser(end.height, best.height[side]);
     }
   }
   team_.sync();

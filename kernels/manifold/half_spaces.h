@@ -67,7 +67,9 @@ class HalfSpaces {
       drops = drops || (!counts && basis_.has(kWalls + i));
       space[i].counts = counts;
     }
-    if (team.any(drops) && team.rank() == 0) begin_basis();
+    drops = team.any(drops);
+    team.sync();  // all have read the basis
+    if (drops && team.rank() == 0) begin_basis();
     team.sync();
   }
   /// Forgets those beyond which the body goes on. Result: whether there are any.
@@ -82,7 +84,9 @@ class HalfSpaces {
       drops = drops || basis_.has(kWalls + i), any = true;
       of.triangle = kNoIndex, of.counts = false;
     }
-    if (team.any(drops) && team.rank() == 0) begin_basis();
+    drops = team.any(drops);
+    team.sync();  // all have read the basis
+    if (drops && team.rank() == 0) begin_basis();
     team.sync();
     return team.any(any);
   }

@@ -10,7 +10,7 @@
 namespace tandem::test {
 namespace {
 
-constexpr double kDegree = 3.14159265358979323846 / 180;
+constexpr double kOneDegree = 3.14159265358979323846 / 180;
 
 /// Splits each triangle into four at the middles of its edges. The surface stays where it is, but for
 /// float32.
@@ -99,7 +99,7 @@ void PrintTo(const Solid& solid, std::ostream* out) {
   *out << solid.name;
 }
 
-const std::vector<Solid>& solids() {
+const std::vector<Solid>& cut_solids() {
   static const std::vector<Solid> all = {{"box", box(1, 0.75f, 0.5f)},
                                          {"tetrahedron", tetrahedron()},
                                          {"sphere", sphere(0.5, 2)},
@@ -111,7 +111,7 @@ const std::vector<Solid>& solids() {
   return all;
 }
 
-double angle_between(const Vector3& p, const Vector3& q) {
+double angle_of(const Vector3& p, const Vector3& q) {
   return std::atan2(norm(cross(p, q)), dot(p, q));
 }
 
@@ -131,7 +131,7 @@ struct Differences {
           y.begin(), y.end(), [&](const Manifold& p, const Manifold& q) { return off(p) < off(q); });
       ++manifolds;
       other_depth += std::fabs(m.depth - n.depth) > 0.01 * std::max(m.depth, n.depth) + 1e-6;
-      other_normal += angle_between(vector_of(m.normal), vector_of(n.normal)) > kDegree;
+      other_normal += angle_of(vector_of(m.normal), vector_of(n.normal)) > kOneDegree;
     }
   }
 };
@@ -141,7 +141,7 @@ class Triangulations : public testing::TestWithParam<Solid> {};
 TEST_P(Triangulations, OfOneSolidGiveTheSameManifolds) {
   RandomPoses random(17);
   Differences flat, deep;
-  for (const Solid& other : solids()) {
+  for (const Solid& other : cut_solids()) {
     Mesh a = GetParam().mesh, b = other.mesh;
     ManifoldScene coarse, fine;
     coarse.add_body(coarse.add_shape(a), kIdentityPose);
@@ -192,7 +192,7 @@ TEST_P(Triangulations, OfOneSolidGiveTheSameManifolds) {
   EXPECT_LE(deep.other_normal, deep.manifolds / 50);
 }
 
-INSTANTIATE_TEST_SUITE_P(Solids, Triangulations, testing::ValuesIn(solids()),
+INSTANTIATE_TEST_SUITE_P(Solids, Triangulations, testing::ValuesIn(cut_solids()),
                          [](const auto& tested) { return std::string(tested.param.name); });
 
 }  // namespace

@@ -366,7 +366,8 @@ TEST_F(GpuManifolds, ThatAreKeptAreTheCpus) {
     for (int step = 0; step < 10; ++step) {
       const std::vector<ObjectPair> pairs = some_pairs(scene.instances, in_order, random);
       std::vector<double> of_pair;
-      for (std::size_t i = 0; step == 6 && i < pairs.size(); ++i) of_pair.push_back(random.below(3) * 2e-3);
+      for (std::size_t i = 0; step == 6 && i < pairs.size(); ++i)
+        of_pair.push_back(static_cast<double>(random.below(3)) * 2e-3);
       kept += both.step(scene.instances, pairs, step == 5 ? 0 : 3e-3, step != 4, of_pair);
       if (HasFailure()) return;
       if (step != 7) move(scene.instances, random, 5e-4);

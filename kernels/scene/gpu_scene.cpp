@@ -90,7 +90,7 @@ class Gpu final : public SceneDevice {
       if (status == Status::kOk) status = copy(query.contacts(), query.report().contacts, found.rows);
       return status;
     };
-    // Of no pairs, too: manifolds that are kept may be made of these contacts.
+    // The query is asked of no pairs, too: manifolds that are kept may be made of these contacts.
     return ask<GpuContactQuery>(scene, found, has_blocks, find_contacts, scene.bodies.size() == 0);
   }
 

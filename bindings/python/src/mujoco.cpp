@@ -135,7 +135,7 @@ Parameters of_pair(const Model& model, std::size_t pair) {
   return made;
 }
 
-// Where mjContact has its members, from its first one, `dist`, on, and how many bytes it has.
+// This says where mjContact has its members, from its first one, `dist`, on, and how many bytes it has.
 struct Layout {
   explicit Layout(const nb::dict& offsets) {
     const auto at = [&](const char* name) { return nb::cast<std::size_t>(offsets[name]); };

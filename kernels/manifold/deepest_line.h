@@ -185,7 +185,7 @@ TANDEM_HD_CALLED int DeepestLine<Team>::follow_lines_through(const Vector3* poin
                   reach, kGrazes);
   }
   team_.sync();
-  if (count > 0) walk_lines(team_, questions, 2 * static_cast<std::uint32_t>(count), line);
+  if (count > 0) walk_lines(team_, questions, 2 * static_cast<std::uint32_t>(count));
   int deepest = -1;
   depth = 0;
   for (int i = 0; i < count; ++i) {
@@ -440,7 +440,7 @@ TANDEM_HD bool DeepestLine<Team>::step(int from) {
   lines.ask_straight(2, shared_.seeds.at[from],
                      {shared_.frame.at(p.at, p.height[0]), shared_.frame.at(p.at, p.height[1])});
   team_.sync();
-  walk_lines(team_, questions, kLines, shared_.lines.line);
+  walk_lines(team_, questions, kLines);
   bool is_loose = false;
   const OverlapLine next = line_that_counts(from, is_loose);
   if (next.found()) go_beyond(next.at, next.height);
@@ -465,7 +465,7 @@ TANDEM_HD_CALLED void DeepestLine<Team>::go_to_ends() {
   team_.sync();
   LineQuestion* const line = shared_.lines.line;
   LineQuestions questions(bodies_, line);
-  walk_lines(team_, questions, 2, line);
+  walk_lines(team_, questions, 2);
   if (team_.rank() == 0) {
     OverlapLine& best = shared_.best;
     for (int side = 0; side < 2; ++side) {

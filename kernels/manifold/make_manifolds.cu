@@ -85,17 +85,6 @@ __device__ PieceMemory memory_of(const ManifoldArgs& args, std::uint32_t pair) {
           args.pieces.start + first + pair, args.pieces.table + PieceMemory::kTableWords * first};
 }
 
-/// Whole numbers above 0 in the order of what they are made of.
-__device__ Counter in_order(double x) {
-  const auto bits = static_cast<Counter>(__double_as_longlong(x));
-  constexpr Counter kSign = Counter{1} << 63;
-  return (bits & kSign) != 0 ? ~bits : bits | kSign;
-}
-__device__ double from_order(Counter number) {
-  constexpr Counter kSign = Counter{1} << 63;
-  return __longlong_as_double(static_cast<long long>((number & kSign) != 0 ? number ^ kSign : ~number));
-}
-
 /// Adds what a warp's lanes know of pieces, if anything, to what is known of their pairs. Lanes of the same
 /// pair are neighbours, and the first of them adds.
 __device__ void add_bounds(const ManifoldArgs& args, std::uint32_t pair, bool known,
@@ -128,8 +117,8 @@ __device__ manifold::PieceBounds bounds_of(const PairPieces& pieces) {
   out.segments = pieces.segments;
   out.degenerate = pieces.degenerate != 0;
   for (int k = 0; k < 3; ++k) {
-    out.upper[k] = from_order(pieces.outermost[k]);
-    out.lower[k] = -from_order(pieces.outermost[3 + k]);
+    out.upper[k] = from_order<double>(pieces.outermost[k]);
+    out.lower[k] = -from_order<double>(pieces.outermost[3 + k]);
   }
   return out;
 }

@@ -217,7 +217,7 @@ TANDEM_HD_CALLED void ManifoldMaker<Team>::end_deep(std::uint32_t region, const 
   const std::uint32_t asked = ask_at_rim(lines);
   LineQuestions questions(bodies_, lines.line);
   team_.sync();
-  walk_lines(team_, questions, asked, lines.line);
+  walk_lines(team_, questions, asked);
   take_rim(lines);
   take_deepest(deepest, goes_through(deepest, lines));
 }
@@ -282,7 +282,7 @@ TANDEM_HD bool ManifoldMaker<Team>::goes_through(const OverlapLine& line, LineMe
                   kGrazes);
   }
   team_.sync();
-  walk_lines(team_, questions, 2, lines.line);
+  walk_lines(team_, questions, 2);
   const Crossing &begin_a = lines.line[0].best, &end_b = lines.line[1].best;
   const bool goes = (begin_a.found() && begin_a.height > line.height[1]) ||
                     (end_b.found() && end_b.height < line.height[0]);

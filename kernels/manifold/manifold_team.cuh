@@ -1,12 +1,182 @@
 #pragma once
 #include <cstdint>
 #include <cstring>
+#include <type_traits>
 
 #include "kernels/manifold/surface_line.h"
 #include "kernels/manifold/team.h"
 
 // Teams of a GPU, see manifold/team.h: a warp, and a thread block.
 namespace tandem::gpu {
+
+/// The memory that a warp needs for walks through trees.
+struct WarpWalks {
+  static constexpr std::uint32_t kRoom = 384, kMostTriangles = 64;
+
+  // Those that wait to be looked at, and the question that asks for each. Blocks are oriented where there are
+  // no others.
+  std::uint32_t block[kRoom], triangle[kMostTriangles];
+  std::uint8_t asks[kRoom], asks_triangle[kMostTriangles];
+  const unsigned char* tree[2];  ///< the blocks of each body
+  bool oriented[2];
+};
+
+/// Answers questions of a set of at most 32 by a warp. Blocks of all of them wait on one stack: four lanes
+/// take one of them, a node each. Triangles are looked at when there are enough for all lanes, or no blocks
+/// are left. All of this is in shared memory, and is short: warps that do different things share a cache of
+/// instructions.
+class LineWalks {
+ public:
+  __device__ LineWalks(WarpWalks& walks, const manifold::LineQuestions& questions,
+                       const manifold::LineQuestion* shared)
+      : walks_(walks), questions_(questions), shared_(shared) {}
+
+  __device__ void walk(std::uint32_t questions) {
+    blocks_ = __popc(questions);
+    if ((questions >> lane() & 1u) != 0)
+      put(walks_.block, walks_.asks, __popc(questions & before()), 0, lane());
+    __syncwarp();
+    triangles_ = 0;
+    do {
+#pragma unroll 1
+      while (blocks_ > 0 && triangles_ < 32) look_at_blocks();
+      visit();
+    } while (blocks_ > 0 || triangles_ > 0);
+  }
+
+ private:
+  __device__ static std::uint32_t lane() {
+    return threadIdx.x % 32;
+  }
+  /// The lanes before this one.
+  __device__ static std::uint32_t before() {
+    return (1u << lane()) - 1;
+  }
+
+  __device__ static void put(std::uint32_t* waiting, std::uint8_t* asks, std::uint32_t place,
+                             std::uint32_t index, std::uint32_t question) {
+    waiting[place] = index, asks[place] = static_cast<std::uint8_t>(question);
+  }
+
+  /// Returns whether a lane's node of a block passes a question's test. below: what is below it.
+  __device__ bool passes(std::uint32_t block, const manifold::LineQuestion& question, std::uint32_t& below,
+                         bool& is_leaf) const {
+    static_assert(offsetof(Block, half_extent) == offsetof(OrientedBlock, half_extent));
+    const std::uint32_t node = lane() % kNodesPerBlock;
+    const int side = question.side;
+    const bool oriented = walks_.oriented[side];
+    const unsigned char* const at =
+        walks_.tree[side] + std::size_t{block} * (oriented ? sizeof(OrientedBlock) : sizeof(Block));
+    const float* const box = reinterpret_cast<const float*>(at) + node;
+    manifold::FloatVector centre, half;
+#pragma unroll
+    for (int k = 0; k < 3; ++k)
+      centre.x[k] = box[k * kNodesPerBlock], half.x[k] = box[(3 + k) * kNodesPerBlock];
+    manifold::LineTest test = question.test;
+    if (oriented) {
+      const auto& of = *reinterpret_cast<const OrientedBlock*>(at);
+      below = (of.first_below & ~OrientedBlock::kIsLeafBlock) + node, is_leaf = of.is_leaf_block();
+      test = test.turned(manifold::ToBlock(of.rotation));
+    } else {
+      const auto& of = *reinterpret_cast<const Block*>(at);
+      below = of.index[node], is_leaf = of.is_leaf_block();
+    }
+    return test.passes(centre, half);
+  }
+
+  /// Takes some blocks off the stack, and puts there what is below the nodes that pass.
+  __device__ void look_at_blocks() {
+    static_assert(kNodesPerBlock == 4);
+    // With so many blocks left they are taken one by one, depth first, and need no more room than this.
+    constexpr std::uint32_t kReserve = 3 * kMaxDepth + 4, kAtOnce = 8;
+    static_assert(WarpWalks::kRoom > kReserve + 32 + 4 * kAtOnce);
+    const std::uint32_t most = blocks_ + 3 * kAtOnce + kReserve <= WarpWalks::kRoom ? kAtOnce : 1;
+    const std::uint32_t taken = blocks_ < most ? blocks_ : most;
+    bool passed = false, is_leaf = false;
+    std::uint32_t below = 0, question = 0;
+    if (lane() / 4 < taken) {
+      const std::uint32_t place = blocks_ - 1 - lane() / 4;
+      question = walks_.asks[place];
+      passed = passes(walks_.block[place], shared_[question], below, is_leaf);
+    }
+    const std::uint32_t inner = __ballot_sync(kWarp, passed && !is_leaf),
+                        leaf = __ballot_sync(kWarp, passed && is_leaf);
+    __syncwarp();  // all have taken theirs
+    blocks_ -= taken;
+    if (passed && is_leaf)
+      put(walks_.triangle, walks_.asks_triangle, triangles_ + __popc(leaf & before()), below, question);
+    if (passed && !is_leaf)
+      put(walks_.block, walks_.asks, blocks_ + __popc(inner & before()), below, question);
+    blocks_ += __popc(inner), triangles_ += __popc(leaf);
+    __syncwarp();
+  }
+
+  /// Looks at triangles, one of each lane.
+  __device__ void visit() {
+    manifold::Crossing crossing;
+    std::uint32_t question = 0;
+    if (lane() < triangles_) {
+      const std::uint32_t place = triangles_ - 1 - lane();
+      question = walks_.asks_triangle[place];
+      crossing = questions_.visit(question, walks_.triangle[place]);
+    }
+    __syncwarp();  // all have taken theirs
+    triangles_ = triangles_ < 32 ? 0 : triangles_ - 32;
+    // One lane of each question takes at a time.
+    for (bool found = crossing.found(); __any_sync(kWarp, found);) {
+      const std::uint32_t same = __match_any_sync(kWarp, found ? question : kNoIndex);
+      const bool takes = found && (same & before()) == 0;
+      if (takes) questions_.take(question, crossing);
+      found = found && !takes;
+      __syncwarp();
+    }
+  }
+
+  static constexpr std::uint32_t kWarp = 0xFFFFFFFFu;
+
+  WarpWalks& walks_;
+  const manifold::LineQuestions& questions_;
+  const manifold::LineQuestion* shared_;
+  std::uint32_t blocks_ = 0, triangles_ = 0;  ///< that wait
+};
+
+/// A place in shared memory, as a function that is not inlined takes it: the compiler then knows what it is.
+template <typename T>
+struct SharedPlace {
+  std::size_t at;
+
+  __device__ explicit SharedPlace(T* place) : at(__cvta_generic_to_shared(place)) {}
+  __device__ T* operator()() const { return static_cast<T*>(__cvta_shared_to_generic(at)); }
+};
+
+/// Answers questions about lines by several warps, the number `warp` here.
+inline __device__ __noinline__ void walk_lines(SharedPlace<WarpWalks> of_warp,
+                                               SharedPlace<const manifold::BodyPair> of_pair,
+                                               SharedPlace<manifold::LineQuestion> asked_for,
+                                               std::uint32_t count, std::uint32_t warp, std::uint32_t warps) {
+  static_assert(manifold::LineMemory::kMost <= 32);
+  WarpWalks& walks = *of_warp();
+  const manifold::BodyPair& bodies = *of_pair();
+  manifold::LineQuestion* const shared = asked_for();
+  const manifold::LineQuestions questions(bodies, shared);
+  const std::uint32_t lane = threadIdx.x % 32;
+  if (lane < 2) {
+    const manifold::Shape& shape = *bodies[static_cast<int>(lane)].shape;
+    walks.oriented[lane] = shape.blocks == nullptr;
+    walks.tree[lane] = shape.blocks == nullptr ? reinterpret_cast<const unsigned char*>(shape.oriented_blocks)
+                                               : reinterpret_cast<const unsigned char*>(shape.blocks);
+  }
+  bool asked = lane < count && lane % warps == warp && shared[lane].side >= 0;
+  if (asked) questions.prepare(lane);
+  LineWalks all(walks, questions, shared);
+#pragma unroll 1
+  for (std::uint32_t left = __ballot_sync(0xFFFFFFFFu, asked); left != 0;
+       left = __ballot_sync(0xFFFFFFFFu, asked)) {
+    all.walk(left);
+    asked = asked && questions.has_to_look_further(lane);
+    if (asked) questions.look_further(lane);
+  }
+}
 
 /// The base of both teams: numbers in memory that the team shares, and what the lanes of a warp tell each
 /// other.
@@ -22,6 +192,12 @@ struct TeamOfWarps {
   template <typename T>
   __device__ static T from_lane(T value, std::uint32_t lane) {
     return __shfl_sync(0xFFFFFFFFu, value, static_cast<int>(lane));
+  }
+
+  __device__ static void walk(WarpWalks& walks, const manifold::LineQuestions& questions, std::uint32_t count,
+                              std::uint32_t warp, std::uint32_t warps) {
+    gpu::walk_lines(SharedPlace(&walks), SharedPlace(&questions.bodies()), SharedPlace(questions.questions()),
+                    count, warp, warps);
   }
 
   __device__ static std::uint32_t load(const std::uint32_t& at) {
@@ -42,131 +218,6 @@ struct TeamOfWarps {
   }
 };
 
-/// The memory that a warp needs for walks through trees.
-struct WarpWalks {
-  static constexpr std::uint32_t kRoom = 512, kMostLeaves = 64;
-
-  std::uint32_t block[kRoom], triangle[kMostLeaves];     ///< that wait to be looked at
-  std::uint8_t asks[kRoom], asks_triangle[kMostLeaves];  ///< the question that asks for each
-};
-
-/// Answers questions first, first + step, ... of at most 32 by a warp. Blocks of all of them wait on one
-/// stack: four lanes take one of them, a node each. Triangles are looked at when there are enough for all
-/// lanes, or no blocks are left.
-class LineWalks {
- public:
-  __device__ LineWalks(WarpWalks& walks, manifold::LineQuestions& questions)
-      : walks_(walks), questions_(questions) {}
-
-  __device__ void walk(std::uint32_t questions) {
-    const std::uint32_t lane = threadIdx.x % 32;
-    blocks_ = __popc(questions);
-    if ((questions >> lane & 1u) != 0) {
-      const std::uint32_t place = __popc(questions & ((1u << lane) - 1));
-      walks_.block[place] = 0, walks_.asks[place] = static_cast<std::uint8_t>(lane);
-    }
-    __syncwarp();
-    std::uint32_t leaves = 0;
-    do {
-      while (blocks_ > 0 && leaves < 32) leaves = look_at_blocks(leaves);
-      leaves = visit(leaves);
-    } while (blocks_ > 0 || leaves > 0);
-  }
-
- private:
-  /// Takes some blocks off the stack, and puts there what is below the nodes that pass. Result: how many
-  /// triangles wait.
-  __device__ std::uint32_t look_at_blocks(std::uint32_t leaves) {
-    static_assert(kNodesPerBlock == 4);
-    // With so many blocks left they are taken one by one, depth first, and need no more room than this.
-    constexpr std::uint32_t kReserve = 3 * kMaxDepth + 4, kAtOnce = 8;
-    static_assert(WarpWalks::kRoom > kReserve + 32 + 4 * kAtOnce);
-    const std::uint32_t lane = threadIdx.x % 32, node = lane % 4, before = (1u << lane) - 1;
-    const std::uint32_t most = blocks_ + 3 * kAtOnce + kReserve <= WarpWalks::kRoom ? kAtOnce : 1;
-    const std::uint32_t taken = blocks_ < most ? blocks_ : most;
-    bool passes = false, is_leaf = false;
-    std::uint32_t below = 0;
-    std::uint8_t question = 0;
-    if (lane / 4 < taken) {
-      const std::uint32_t place = blocks_ - 1 - lane / 4, index = walks_.block[place];
-      question = walks_.asks[place];
-      const manifold::LineTest test = questions_.test(question);
-      const manifold::Shape& shape = *questions_.body(question).shape;
-      const auto look = [&](const auto& block, const manifold::LineTest& along_axes) {
-        is_leaf = block.is_leaf_block();
-        passes = along_axes.passes(
-            {{block.centre[0][node], block.centre[1][node], block.centre[2][node]}},
-            {{block.half_extent[0][node], block.half_extent[1][node], block.half_extent[2][node]}});
-      };
-      if (shape.blocks != nullptr) {
-        const Block& block = shape.blocks[index];
-        below = block.index[node];
-        look(block, test);
-      } else {
-        const OrientedBlock& block = shape.oriented_blocks[index];
-        below = (block.first_below & ~OrientedBlock::kIsLeafBlock) + node;
-        look(block, test.turned(manifold::ToBlock(block.rotation)));
-      }
-    }
-    const std::uint32_t inner = __ballot_sync(kWarp, passes && !is_leaf),
-                        leaf = __ballot_sync(kWarp, passes && is_leaf);
-    __syncwarp();  // all have taken theirs
-    blocks_ -= taken;
-    if (passes && is_leaf) {
-      const std::uint32_t place = leaves + __popc(leaf & before);
-      walks_.triangle[place] = below, walks_.asks_triangle[place] = question;
-    } else if (passes) {
-      const std::uint32_t place = blocks_ + __popc(inner & before);
-      walks_.block[place] = below, walks_.asks[place] = question;
-    }
-    blocks_ += __popc(inner);
-    __syncwarp();
-    return leaves + __popc(leaf);
-  }
-
-  /// Looks at triangles, one of each lane. Result: how many are left.
-  __device__ std::uint32_t visit(std::uint32_t leaves) {
-    const std::uint32_t lane = threadIdx.x % 32;
-    manifold::Crossing crossing;
-    std::uint8_t question = 0;
-    if (lane < leaves) {
-      const std::uint32_t place = leaves - 1 - lane;
-      question = walks_.asks_triangle[place];
-      crossing = questions_.visit(question, walks_.triangle[place]);
-    }
-    for (std::uint32_t found = __ballot_sync(kWarp, crossing.found()); found != 0; found &= found - 1) {
-      if (lane + 1 == static_cast<std::uint32_t>(__ffs(static_cast<int>(found))))
-        questions_.take(question, crossing);
-      __syncwarp();
-    }
-    __syncwarp();  // all have taken theirs
-    return leaves < 32 ? 0 : leaves - 32;
-  }
-
-  static constexpr std::uint32_t kWarp = 0xFFFFFFFFu;
-
-  WarpWalks& walks_;
-  manifold::LineQuestions& questions_;
-  std::uint32_t blocks_ = 0;
-};
-
-/// Answers questions about lines by several warps, the number `warp` here.
-inline __device__ __noinline__ void walk_lines(WarpWalks& walks, manifold::LineQuestions& questions,
-                                               std::uint32_t count, const manifold::LineQuestion* shared,
-                                               std::uint32_t warp, std::uint32_t warps) {
-  static_assert(manifold::LineMemory::kMost <= 32);
-  const std::uint32_t lane = threadIdx.x % 32;
-  bool asked = lane < count && lane % warps == warp && shared[lane].side >= 0;
-  if (asked) questions.prepare(lane);
-  LineWalks all(walks, questions);
-#pragma unroll 1
-  for (std::uint32_t left = TeamOfWarps::ballot(asked); left != 0; left = TeamOfWarps::ballot(asked)) {
-    all.walk(left);
-    asked = asked && questions.has_to_look_further(lane);
-    if (asked) questions.look_further(lane);
-  }
-}
-
 struct Sum {
   template <typename T>
   __device__ T operator()(T x, T y) const {
@@ -186,16 +237,72 @@ struct Greatest {
   }
 };
 
-template <typename T, typename Of>
-__device__ T over_warp(T value, Of of) {
+/// Whole numbers in the order of what they are made of, which is not NaN.
+__device__ inline std::uint32_t in_order(std::uint32_t x) {
+  return x;
+}
+__device__ inline std::uint32_t in_order(int x) {
+  return static_cast<std::uint32_t>(x) ^ 1u << 31;
+}
+__device__ inline std::uint32_t in_order(float x) {
+  const int bits = __float_as_int(x);
+  return in_order(bits ^ (bits >> 31 & 0x7FFFFFFF));
+}
+__device__ inline Counter in_order(Counter x) {
+  return x;
+}
+__device__ inline Counter in_order(std::uint64_t x) {
+  return x;
+}
+__device__ inline Counter in_order(double x) {
+  const long long bits = __double_as_longlong(x), low = 0x7FFFFFFFFFFFFFFF;
+  return static_cast<Counter>(bits ^ (bits >> 63 & low)) ^ Counter { 1 } << 63;
+}
+
+/// What in_order() made a number of.
+template <typename T>
+__device__ T from_order(decltype(in_order(T())) number) {
+  if constexpr (std::is_same_v<T, int>) {
+    return static_cast<int>(number ^ 1u << 31);
+  } else if constexpr (std::is_same_v<T, float>) {
+    const int bits = from_order<int>(number);
+    return __int_as_float(bits ^ (bits >> 31 & 0x7FFFFFFF));
+  } else if constexpr (std::is_same_v<T, double>) {
+    const auto bits = static_cast<long long>(number ^ Counter{1} << 63), low = 0x7FFFFFFFFFFFFFFFll;
+    return __longlong_as_double(bits ^ (bits >> 63 & low));
+  } else {
+    return number;
+  }
+}
+
+/// The greatest number of a warp's lanes.
+__device__ inline std::uint32_t greatest_of_lanes(std::uint32_t number) {
+  return __reduce_max_sync(0xFFFFFFFFu, number);
+}
+__device__ inline Counter greatest_of_lanes(Counter number) {
+  const auto upper = static_cast<std::uint32_t>(number >> 32), lower = static_cast<std::uint32_t>(number);
+  const std::uint32_t greatest = greatest_of_lanes(upper);
+  return Counter{greatest} << 32 | greatest_of_lanes(upper == greatest ? lower : 0u);
+}
+
+template <typename T>
+__device__ T over_warp(T value, Sum of) {
   for (int distance = 16; distance > 0; distance /= 2)
     value = of(value, __shfl_xor_sync(0xFFFFFFFFu, value, distance));
   return value;
 }
+template <typename T>
+__device__ T over_warp(T value, Greatest) {
+  return from_order<T>(greatest_of_lanes(in_order(value)));
+}
+template <typename T>
+__device__ T over_warp(T value, Least) {
+  return from_order<T>(~greatest_of_lanes(~in_order(value)));
+}
 
 /// Returns for each of several values what `of` makes of those of all lanes.
 template <typename T, int kCount, typename Of>
-__device__ __forceinline__ void over_warp(T (&values)[kCount], Of of) {
+__device__ __forceinline__ void each_over_warp(T (&values)[kCount], Of of) {
 #pragma unroll
   for (int i = 0; i < kCount; ++i) values[i] = over_warp(values[i], of);
 }
@@ -224,22 +331,21 @@ struct WarpTeam : TeamOfWarps {
   }
   template <typename T, int kCount>
   __device__ __forceinline__ static void sums(T (&values)[kCount]) {
-    over_warp(values, Sum());
+    each_over_warp(values, Sum());
   }
   template <typename T, int kCount>
   __device__ __forceinline__ static void least_ones(T (&values)[kCount]) {
-    over_warp(values, Least());
+    each_over_warp(values, Least());
   }
   template <typename T, int kCount>
   __device__ __forceinline__ static void greatest_ones(T (&values)[kCount]) {
-    over_warp(values, Greatest());
+    each_over_warp(values, Greatest());
   }
   __device__ static bool any(bool value) { return __any_sync(0xFFFFFFFFu, value) != 0; }
 
-  __device__ void walk_lines(manifold::LineQuestions& questions, std::uint32_t count,
-                             const manifold::LineQuestion* shared) const {
+  __device__ void walk_lines(const manifold::LineQuestions& questions, std::uint32_t count) const {
     sync();
-    gpu::walk_lines(*walks, questions, count, shared, 0, 1);
+    walk(*walks, questions, count, 0, 1);
     sync();
   }
 };
@@ -295,11 +401,10 @@ struct BlockTeam : TeamOfWarps {
     over_block(values, Greatest());
   }
 
-  __device__ void walk_lines(manifold::LineQuestions& questions, std::uint32_t count,
-                             const manifold::LineQuestion* shared) const {
+  __device__ void walk_lines(const manifold::LineQuestions& questions, std::uint32_t count) const {
     sync();
     const std::uint32_t warp = threadIdx.x / 32;
-    gpu::walk_lines(walks[warp], questions, count, shared, warp, kThreads / 32);
+    walk(walks[warp], questions, count, warp, kThreads / 32);
     sync();
   }
 
@@ -313,7 +418,7 @@ struct BlockTeam : TeamOfWarps {
   template <typename T, int kCount, typename Of>
   __device__ __forceinline__ void over_block(T (&values)[kCount], Of of) const {
     static_assert(sizeof(T) <= sizeof(Counter) && kCount <= BlockScratch<kThreads>::kMost);
-    over_warp(values, of);
+    each_over_warp(values, of);
     const auto part = [&](int i, std::uint32_t warp) -> T& {
       return *reinterpret_cast<T*>(&scratch->part[i][warp]);
     };

@@ -201,7 +201,7 @@ TANDEM_HD_CALLED std::uint32_t OverlapLines<Team>::go_inside(const Place* place,
                     kGrazes);
   }
   team_.sync();
-  walk_lines(team_, questions, asked + 2 * static_cast<std::uint32_t>(count), shared_.line);
+  walk_lines(team_, questions, asked + 2 * static_cast<std::uint32_t>(count));
   std::uint32_t found = 0;
   for (int i = 0; i < count; ++i) {
     const LineQuestion* const line = shared_.line + asked + 2 * i;
@@ -247,7 +247,7 @@ TANDEM_HD_CALLED bool OverlapLines<Team>::any_is_free(const Vector3 (*ends)[2], 
     ask_straight(2 * static_cast<std::uint32_t>(i), ends[i][0], {ends[i][1], ends[i][1]});
   team_.sync();
   LineQuestions questions(bodies_, shared_.line);
-  walk_lines(team_, questions, 2 * static_cast<std::uint32_t>(count), shared_.line);
+  walk_lines(team_, questions, 2 * static_cast<std::uint32_t>(count));
   bool any = false;
   for (int i = 0; i < count; ++i)
     any = any || (!shared_.line[2 * i].best.found() && !shared_.line[2 * i + 1].best.found());

@@ -63,6 +63,22 @@ TANDEM_HD inline float slack_near(const Body& body, const FloatVector& point) {
   return static_cast<float>(far) * kBoxSlack + static_cast<float>(body.reach) * 0x1p-42f;
 }
 
+/// Tests of boxes have slack, so a GPU computes them the quick way.
+TANDEM_HD inline float fused(float x, float y, float z) {
+#ifdef __CUDA_ARCH__
+  return __fmaf_rn(x, y, z);
+#else
+  return x * y + z;
+#endif
+}
+TANDEM_HD inline float quotient(float x, float y) {
+#ifdef __CUDA_ARCH__
+  return __fdividef(x, y);
+#else
+  return x / y;
+#endif
+}
+
 /// A rotation from the axes of the mesh to those of a block's frame. Its rounding, some twenty units of the
 /// vector's, is within kBoxSlack.
 class ToBlock {
@@ -70,19 +86,19 @@ class ToBlock {
   TANDEM_HD explicit ToBlock(const BlockRotation& rotation)
       : w_(quaternion_part(rotation, 0)),
         v_{{quaternion_part(rotation, 1), quaternion_part(rotation, 2), quaternion_part(rotation, 3)}},
-        two_by_square_(2 / (w_ * w_ + dot(v_, v_))) {}
+        two_by_square_(quotient(2, fused(w_, w_, dot(v_, v_)))) {}
 
   TANDEM_HD FloatVector operator()(const FloatVector& p) const {
     const FloatVector across = cross(v_, p), twice = cross(v_, across);
     FloatVector out;
-    for (int k = 0; k < 3; ++k) out.x[k] = p.x[k] + two_by_square_ * (twice.x[k] - w_ * across.x[k]);
+    for (int k = 0; k < 3; ++k) out.x[k] = fused(two_by_square_, fused(-w_, across.x[k], twice.x[k]), p.x[k]);
     return out;
   }
 
  private:
   TANDEM_HD static FloatVector cross(const FloatVector& p, const FloatVector& q) {
-    return {{p.x[1] * q.x[2] - p.x[2] * q.x[1], p.x[2] * q.x[0] - p.x[0] * q.x[2],
-             p.x[0] * q.x[1] - p.x[1] * q.x[0]}};
+    return {{fused(p.x[1], q.x[2], -(p.x[2] * q.x[1])), fused(p.x[2], q.x[0], -(p.x[0] * q.x[2])),
+             fused(p.x[0], q.x[1], -(p.x[1] * q.x[0]))}};
   }
 
   float w_;
@@ -149,7 +165,7 @@ inline constexpr double kGrazes = 1e-6;
 
 /// Boxes that the line meets, no further from the target along it than `reach`, and with heights above it
 /// between `lower` and `upper`.
-struct LineTest {
+struct alignas(16) LineTest {
   FloatVector point, direction;  // at the target's height
   float lower, upper, slack, reach;
 
@@ -160,12 +176,14 @@ struct LineTest {
     const float x = c.x[0] - point.x[0], y = c.x[1] - point.x[1], z = c.x[2] - point.x[2];
     const float p = direction.x[0], q = direction.x[1], r = direction.x[2];
     const float ap = std::fabs(p), aq = std::fabs(q), ar = std::fabs(r);
-    if (!(h.x[0] >= 0)) return false;
-    if (std::fabs(y * r - z * q) > h.x[1] * ar + h.x[2] * aq + slack) return false;
-    if (std::fabs(z * p - x * r) > h.x[2] * ap + h.x[0] * ar + slack) return false;
-    if (std::fabs(x * q - y * p) > h.x[0] * aq + h.x[1] * ap + slack) return false;
-    const float along = x * p + y * q + z * r, extent = h.x[0] * ap + h.x[1] * aq + h.x[2] * ar + slack;
-    return !(std::fabs(along) - extent > reach || along + extent < lower || along - extent > upper);
+    const bool beside = (std::fabs(fused(y, r, -(z * q))) > fused(h.x[1], ar, fused(h.x[2], aq, slack))) |
+                        (std::fabs(fused(z, p, -(x * r))) > fused(h.x[2], ap, fused(h.x[0], ar, slack))) |
+                        (std::fabs(fused(x, q, -(y * p))) > fused(h.x[0], aq, fused(h.x[1], ap, slack)));
+    const float along = fused(x, p, fused(y, q, z * r)),
+                extent = fused(h.x[0], ap, fused(h.x[1], aq, fused(h.x[2], ar, slack)));
+    const bool away =
+        (std::fabs(along) - extent > reach) | (along + extent < lower) | (along - extent > upper);
+    return (h.x[0] >= 0) & !(beside | away);
   }
 };
 
@@ -181,9 +199,7 @@ struct LineQuestion {
   double length;      ///< of a straight line from one point to another
   int side, facing;
 
-  // The test of boxes.
-  FloatVector point, direction;
-  float lower_along, upper_along, slack, reach;
+  LineTest test;  ///< of boxes
 
   double nearest;
   Crossing best;
@@ -196,7 +212,7 @@ class LineQuestions {
 
   /// expected: how far from the target it is, mostly; it is looked for there first.
   TANDEM_HD void ask(std::uint32_t question, const PatchFrame& frame, int side, int facing, const Vector2& at,
-                     double target, double lower, double upper, double expected, double least_sine) {
+                     double target, double lower, double upper, double expected, double least_sine) const {
     LineQuestion& q = questions_[question];
     q.frame = &frame;
     q.least_sine = least_sine;
@@ -207,21 +223,22 @@ class LineQuestions {
   }
 
   /// Makes the test of boxes.
-  TANDEM_HD void prepare(std::uint32_t question) {
+  TANDEM_HD void prepare(std::uint32_t question) const {
     LineQuestion& q = questions_[question];
     const Body& body = bodies_[q.side];
-    q.point = point_in_mesh(body, q.frame->at(q.at, q.target));
-    q.direction = in_mesh(body, q.frame->n);
-    q.slack = slack_near(body, q.point);
-    q.lower_along = static_cast<float>(q.lower - q.target) - q.slack;
-    q.upper_along = static_cast<float>(q.upper - q.target) + q.slack;
+    LineTest& test = q.test;
+    test.point = point_in_mesh(body, q.frame->at(q.at, q.target));
+    test.direction = in_mesh(body, q.frame->n);
+    test.slack = slack_near(body, test.point);
+    test.lower = static_cast<float>(q.lower - q.target) - test.slack;
+    test.upper = static_cast<float>(q.upper - q.target) + test.slack;
     look_within(q, q.most);
   }
 
   /// Answers the first `count` questions; those of no side were not asked. Lines of a frame are followed
   /// together.
   template <typename Lanes>
-  void answer(const Lanes& lanes, std::uint32_t count) {
+  void answer(const Lanes& lanes, std::uint32_t count) const {
     for (std::uint32_t first = 0, next = 0; first < count; first = next) {
       const PatchFrame* const frame = questions_[first].frame;
       for (next = first + 1; next < count && questions_[next].frame == frame;) ++next;
@@ -238,7 +255,7 @@ class LineQuestions {
 
   /// If nothing lies as near as expected, the walk has to look further away. Not all boxes there were looked
   /// at, so what was found there need not be the nearest.
-  TANDEM_HD void look_further(std::uint32_t question) {
+  TANDEM_HD void look_further(std::uint32_t question) const {
     look_within(questions_[question], questions_[question].nearest);
   }
   TANDEM_HD bool has_to_look_further(std::uint32_t question) const {
@@ -246,11 +263,8 @@ class LineQuestions {
     return q.nearest > q.most && q.most != INFINITY;
   }
 
-  TANDEM_HD const Body& body(std::uint32_t question) const { return bodies_[questions_[question].side]; }
-  TANDEM_HD LineTest test(std::uint32_t question) const {
-    const LineQuestion& q = questions_[question];
-    return {q.point, q.direction, q.lower_along, q.upper_along, q.slack, q.reach};
-  }
+  TANDEM_HD const BodyPair& bodies() const { return bodies_; }
+  TANDEM_HD LineQuestion* questions() const { return questions_; }
   /// Returns where the line meets a triangle, if that is no further from the target than what was found.
   TANDEM_HD Crossing visit(std::uint32_t question, std::uint32_t t) const {
     const LineQuestion& q = questions_[question];
@@ -280,11 +294,11 @@ class LineQuestions {
     return is_asked ? Crossing{height, t} : Crossing{};
   }
   /// Takes a crossing if it is nearer than what was found; of two as near, the triangle that comes first.
-  TANDEM_HD void take(std::uint32_t question, const Crossing& crossing) {
+  TANDEM_HD void take(std::uint32_t question, const Crossing& crossing) const {
     LineQuestion& q = questions_[question];
     if (!is_nearer(q, crossing)) return;
     q.nearest = std::fabs(crossing.height - q.target), q.best = crossing;
-    q.reach = lesser(q.reach, static_cast<float>(q.nearest) + q.slack);
+    q.test.reach = lesser(q.test.reach, static_cast<float>(q.nearest) + q.test.slack);
   }
 
   /// Far from the origin, where rounding is much of a triangle that the line grazes, its shares are known
@@ -308,7 +322,7 @@ class LineQuestions {
   }
   TANDEM_HD static void look_within(LineQuestion& q, double most) {
     q.most = most;
-    q.reach = static_cast<float>(most) + q.slack;
+    q.test.reach = static_cast<float>(most) + q.test.slack;
     q.nearest = INFINITY;
     q.best = {};
   }
@@ -318,11 +332,11 @@ class LineQuestions {
 };
 
 /// Looks for what a question asks for in the tree of its body, by one thread.
-TANDEM_HD inline void walk_line(LineQuestions& questions, std::uint32_t question) {
+TANDEM_HD inline void walk_line(const LineQuestions& questions, std::uint32_t question) {
+  const LineQuestion& asked = questions.questions()[question];
   std::uint32_t waiting[3 * kMaxDepth + 1] = {0};
   for (int count = 1; count > 0;) {
-    const Below below =
-        look_below(*questions.body(question).shape, waiting[--count], questions.test(question));
+    const Below below = look_below(*questions.bodies()[asked.side].shape, waiting[--count], asked.test);
     for (int i = 0; i < kNodesPerBlock; ++i) {
       if ((below.mask >> i & 1u) == 0) continue;
       if (!below.leaves) {
@@ -335,18 +349,16 @@ TANDEM_HD inline void walk_line(LineQuestions& questions, std::uint32_t question
   }
 }
 
-/// Answers the first `count` questions about lines; those of no side are not asked. shared: the questions,
-/// which all of the team see.
+/// Answers the first `count` questions about lines; those of no side are not asked. All of the team see them.
 template <typename Team>
-TANDEM_HD void walk_lines(const Team& team, LineQuestions& questions, std::uint32_t count,
-                          const LineQuestion* shared) {
+TANDEM_HD void walk_lines(const Team& team, const LineQuestions& questions, std::uint32_t count) {
   if constexpr (HasLanes<Team>) {
     questions.answer(team.lanes(), count);
   } else if constexpr (HasWarps<Team>) {
-    team.walk_lines(questions, count, shared);
+    team.walk_lines(questions, count);
   } else {
     for (std::uint32_t i = 0; i < count; ++i) {
-      if (shared[i].side < 0) continue;
+      if (questions.questions()[i].side < 0) continue;
       questions.prepare(i);
       walk_line(questions, i);
       if (!questions.has_to_look_further(i)) continue;

@@ -99,16 +99,17 @@ class DeepestLine {
   /// Finds shared.best; none where the bodies do not overlap along the normal. middle, reach: a ball around
   /// the pieces. If there are several regions, the line goes through it. The search ends as soon as a line is
   /// as deep as `enough`, which others may lower meanwhile.
-  TANDEM_HD_CALLED void find(const PatchFrame& frame, const Vector3& middle, double reach,
-                             const double& enough);
+  TANDEM_HD void find(const PatchFrame& frame, const Vector3& middle, double reach, const double& enough);
 
  private:
-  TANDEM_HD_CALLED int follow_lines_through(const Vector3* points, int count, double reach, double& depth);
+  template <typename PointAt>
+  TANDEM_HD int follow_lines_through(const PointAt& point_at, int count, std::uint32_t wanted, double reach,
+                                     double& depth);
   TANDEM_HD void search_from_seeds(const double& enough);
-  TANDEM_HD_CALLED bool goes_on_elsewhere() const;
-  TANDEM_HD_CALLED bool look_around(const Vector3& middle, double reach);
-  TANDEM_HD_CALLED void begin_half_spaces(const Vector3& middle, double reach);
-  TANDEM_HD_CALLED void learn(int side, const Crossing& surface, HalfSpace& out) const;
+  TANDEM_HD bool goes_on_elsewhere() const;
+  TANDEM_HD bool look_around(const Vector3& middle, double reach);
+  TANDEM_HD void begin_half_spaces(const Vector3& middle, double reach);
+  TANDEM_HD void learn(int side, const Crossing& surface, HalfSpace& out) const;
   /// Forgets half-spaces beyond which the bodies go on, up to these heights on a line.
   TANDEM_HD void go_beyond(const Vector2& at, const double (&height)[2]) {
     not_convex_ = shared_.spaces.drop_before(team_, at, height, 16 * bodies_.tolerance()) || not_convex_;
@@ -119,7 +120,7 @@ class DeepestLine {
   TANDEM_HD bool is_deep_enough() const { return shared_.best.depth() >= shared_.enough; }
   TANDEM_HD void ask_along(const Vector2& at, const double (&from)[2], const double (&limit)[2],
                            double expected);
-  TANDEM_HD_CALLED void go_to_ends();
+  TANDEM_HD void go_to_ends();
   TANDEM_HD OverlapLine line_that_counts(int from, bool& is_loose) const;
   TANDEM_HD bool learn_from_lines(int from);
   TANDEM_HD bool step(int from);
@@ -141,54 +142,60 @@ TANDEM_HD void DeepestLine<Team>::find_seeds(const Vector3& middle, double reach
   const OverlapLines<Team> lines(team_, bodies_, memory_, shared_.lines);
   const CurvePlaces<Team> places(team_, memory_);
   // The nearest to the middle, the furthest from that, and the furthest off the line of these on either side.
-  Place place[kMostSeeds];
-  Vector3 inside[kMostSeeds], along, across;
-  place[0] = places.nearest_place(begin_, end_, middle, reach);
-  for (int i = 1; i < wanted; ++i) {
-    if (i == 2) along = place[1].at - place[0].at;
-    if (i == 3) across = cross(cross(along, place[2].at - place[0].at), along);
-    place[i] = places.furthest_place(begin_, end_, reach, [&](const Vector3& x) {
-      const Vector3 from = x - place[0].at;
-      if (i == 1) return dot(from, from);
+  Place next = places.nearest_place(begin_, end_, middle, reach);
+  const Vector3 first = next.at;
+  Vector3 along, across;
+  for (int i = 0;; ++i) {
+    if (team_.rank() == 0) shared_.lines.place[i] = next;
+    if (i + 1 == wanted) break;
+    if (i == 1) along = next.at - first;
+    if (i == 2) across = cross(cross(along, next.at - first), along);
+    next = places.furthest_place(begin_, end_, reach, [&](const Vector3& x) {
+      const Vector3 from = x - first;
+      if (i == 0) return dot(from, from);
       const Vector3 off = cross(along, from);
-      return i == 2 ? dot(off, off) : -dot(across, from);
+      return i == 1 ? dot(off, off) : -dot(across, from);
     });
   }
   const double most = greater(bodies_.a.shape->diagonal, bodies_.b.shape->diagonal);
-  const std::uint32_t found = lines.go_inside(place, wanted, most, inside, asked);
+  const std::uint32_t found = lines.go_inside(wanted, most, asked);
   if (team_.rank() == 0) {
     int count = 0;
     for (int i = 0; i < wanted; ++i) {
       if ((found >> i & 1u) == 0) continue;
-      shared_.seeds.at[count] = inside[i], shared_.seeds.beside[count] = place[i].piece;
-      ++count;
+      shared_.seeds.at[count] = shared_.lines.inside[i];
+      shared_.seeds.beside[count++] = shared_.lines.place[i].piece;
     }
     shared_.seeds.count = count;
   }
   team_.sync();
 }
 
-/// Follows the lines along the normal through points of the overlap, LineMemory::kMost / 2 at most. Result:
-/// the point on whose line the bodies overlap most, -1 if they overlap on none. depth: how much that is.
+/// Follows the lines along the normal through points of the overlap, those of `count` that have a bit,
+/// LineMemory::kMost / 2 at most. Result: the point on whose line the bodies overlap most, -1 if they overlap
+/// on none. depth: how much that is.
 template <typename Team>
-TANDEM_HD_CALLED int DeepestLine<Team>::follow_lines_through(const Vector3* points, int count, double reach,
-                                                             double& depth) {
+template <typename PointAt>
+TANDEM_HD int DeepestLine<Team>::follow_lines_through(const PointAt& point_at, int count,
+                                                      std::uint32_t wanted, double reach, double& depth) {
   LineQuestion* const line = shared_.lines.line;
   LineQuestions questions(bodies_, line);
   team_.sync();  // all have read the answers before
   for (int i = static_cast<int>(team_.rank()); i < 2 * count; i += static_cast<int>(team_.size())) {
-    const Vector3& point = points[i / 2];
     const int side = i % 2;
+    const Vector3 point = point_at(i / 2);
     const double from = shared_.frame.height(point);
     questions.ask(static_cast<std::uint32_t>(i), shared_.frame, side, side == 0 ? 1 : -1,
                   shared_.frame.flat(point), from, side == 0 ? from : -INFINITY, side == 0 ? INFINITY : from,
                   reach, kGrazes);
+    if ((wanted >> i / 2 & 1u) == 0) line[i].side = -1;
   }
   team_.sync();
-  if (count > 0) walk_lines(team_, questions, 2 * static_cast<std::uint32_t>(count));
+  if (wanted != 0) walk_lines(team_, questions, 2 * static_cast<std::uint32_t>(count));
   int deepest = -1;
   depth = 0;
   for (int i = 0; i < count; ++i) {
+    if ((wanted >> i & 1u) == 0) continue;
     const Crossing &top = line[2 * i].best, &bottom = line[2 * i + 1].best;
     if (top.found() && bottom.found() && top.height - bottom.height > depth)
       depth = top.height - bottom.height, deepest = i;
@@ -202,7 +209,9 @@ TANDEM_HD void DeepestLine<Team>::begin_with_seeds(const PatchFrame& frame, doub
   if (team_.rank() == 0) shared_.frame = frame;
   team_.sync();
   double depth;
-  const int from = follow_lines_through(shared_.seeds.at, shared_.seeds.count, reach, depth);
+  const int count = shared_.seeds.count;
+  const int from = follow_lines_through([&](int i) { return shared_.seeds.at[i]; }, count, (1u << count) - 1,
+                                        reach, depth);
   if (team_.rank() == 0) {
     shared_.best = {};
     shared_.is_loose = false;
@@ -218,7 +227,7 @@ TANDEM_HD void DeepestLine<Team>::begin_with_seeds(const PatchFrame& frame, doub
 
 /// Returns whether some corners show that a body goes on beyond its half-spaces, and so is not convex.
 template <typename Team>
-TANDEM_HD_CALLED bool DeepestLine<Team>::goes_on_elsewhere() const {
+TANDEM_HD bool DeepestLine<Team>::goes_on_elsewhere() const {
   constexpr std::uint32_t kCorners = 32;  // of each body
   bool goes_on = false;
   for (std::uint32_t i = team_.rank(); i < 2 * kCorners; i += team_.size()) {
@@ -235,7 +244,7 @@ TANDEM_HD_CALLED bool DeepestLine<Team>::goes_on_elsewhere() const {
 /// Follows the lines through more points of the overlap: those between the outermost places of the curve and
 /// what is opposite within both bodies. True if one is deeper than the best line: its point becomes a seed.
 template <typename Team>
-TANDEM_HD_CALLED bool DeepestLine<Team>::look_around(const Vector3& middle, double reach) {
+TANDEM_HD bool DeepestLine<Team>::look_around(const Vector3& middle, double reach) {
   constexpr int kPlaces = 8, kPoints = 2;
   const OverlapLines<Team> lines(team_, bodies_, memory_, shared_.lines);
   const CurvePlaces<Team> places(team_, memory_);
@@ -247,36 +256,32 @@ TANDEM_HD_CALLED bool DeepestLine<Team>::look_around(const Vector3& middle, doub
       middle;
   along = along - dot(along, n) * n;
   const Vector3 across = cross(n, along);
-  Place place[kPlaces];
-  Vector3 inside[kPlaces], point[kPlaces], deepest, direction[kPlaces];
-  constexpr int kStep[kPlaces] = {1, 1, 0, -1, -1, -1, 0, 1};  // eighths of a turn
-  for (int i = 0; i < kPlaces; ++i) {
-    const double x = kStep[i], y = kStep[(i + 6) % kPlaces];
-    direction[i] = x * along + y * across;
-  }
-  const auto height = [&](int i, const Vector3& x) { return dot(x - middle, direction[i]); };
-  places.furthest_places(begin_, end_, reach, height, place);
+  // Eighths of a turn.
+  const auto step = [](int i) { return i % 4 == 2 ? 0.0 : (i + 2) % kPlaces < 4 ? 1.0 : -1.0; };
+  places.template furthest_places<kPlaces>(
+      begin_, end_, reach,
+      [&](int i, const Vector3& x) {
+        return dot(x - middle, step(i) * along + step((i + 6) % kPlaces) * across);
+      },
+      shared_.lines.place);
   const double most = greater(bodies_.a.shape->diagonal, bodies_.b.shape->diagonal);
-  const std::uint32_t found = lines.go_inside(place, kPlaces, most, inside);
+  const std::uint32_t found = lines.go_inside(kPlaces, most);
   double most_depth = shared_.best.depth();
-  int best = -1;
+  int best = -1, part = 0;
+  const Place* const place = shared_.lines.place;
+  const Vector3* const inside = shared_.lines.inside;
+  const auto point = [&](int i, int k) { return place[i].at + (0.4 + 0.8 * k) * (inside[i] - place[i].at); };
   for (int k = 0; k < kPoints; ++k) {
-    int count = 0, from[kPlaces];
-    for (int i = 0; i < kPlaces; ++i) {
-      if ((found >> i & 1u) == 0) continue;
-      point[count] = place[i].at + (0.4 + 0.8 * k) * (inside[i] - place[i].at);
-      from[count++] = i;
-    }
     double depth;
-    const int here = follow_lines_through(point, count, reach, depth);
-    if (here >= 0 && depth > most_depth) most_depth = depth, deepest = point[here], best = from[here];
+    const int here = follow_lines_through([&](int i) { return point(i, k); }, kPlaces, found, reach, depth);
+    if (here >= 0 && depth > most_depth) most_depth = depth, best = here, part = k;
   }
   team_.sync();  // all have read the best line
   if (team_.rank() == 0 && best >= 0) {
     Seeds& seeds = shared_.seeds;
     int at = shared_.from == kMostSeeds - 1 ? kMostSeeds - 2 : kMostSeeds - 1;
     if (seeds.count < kMostSeeds) at = seeds.count++;
-    seeds.at[at] = deepest, seeds.beside[at] = place[best].piece;
+    seeds.at[at] = point(best, part), seeds.beside[at] = place[best].piece;
   }
   team_.sync();
   return best >= 0;
@@ -284,7 +289,7 @@ TANDEM_HD_CALLED bool DeepestLine<Team>::look_around(const Vector3& middle, doub
 
 /// Finds the half-space of a triangle that a line met; none if there is no triangle.
 template <typename Team>
-TANDEM_HD_CALLED void DeepestLine<Team>::learn(int side, const Crossing& surface, HalfSpace& out) const {
+TANDEM_HD void DeepestLine<Team>::learn(int side, const Crossing& surface, HalfSpace& out) const {
   out.side = static_cast<std::uint16_t>(side);
   out.triangle = surface.triangle;
   if (!surface.found()) return;
@@ -310,7 +315,7 @@ TANDEM_HD void DeepestLine<Team>::propose(int seed) {
 
 /// Begins with the triangles that the lines through the seeds met, and those of the pieces beside them.
 template <typename Team>
-TANDEM_HD_CALLED void DeepestLine<Team>::begin_half_spaces(const Vector3& middle, double reach) {
+TANDEM_HD void DeepestLine<Team>::begin_half_spaces(const Vector3& middle, double reach) {
   double far = 0;
   for (int side = 0; side < 2; ++side) {
     const Body& body = bodies_[side];
@@ -376,12 +381,11 @@ TANDEM_HD OverlapLine DeepestLine<Team>::line_that_counts(int from, bool& is_loo
     const Vector2 at = shared_.frame.flat(shared_.seeds.at[from]);
     const double height = shared_.frame.height(shared_.seeds.at[from]);
     out.at = at + part * (p.at - at);
-    for (int side = 0; side < 2; ++side) {
-      out.height[side] = height + part * (p.height[side] - height);
-      out.triangle[side] = side == blocked
-                               ? line[2 + side].best.triangle
-                               : shared_.spaces.nearest_triangle(team_, side, out.at, out.height[side]);
-    }
+    for (int side = 0; side < 2; ++side) out.height[side] = height + part * (p.height[side] - height);
+    const std::uint32_t met = line[2 + blocked].best.triangle;
+    const std::uint32_t other =
+        shared_.spaces.nearest_triangle(team_, 1 - blocked, out.at, out.height[1 - blocked]);
+    out.triangle[0] = blocked == 0 ? met : other, out.triangle[1] = blocked == 0 ? other : met;
     is_loose = true;
   } else {
     const bool on_wall = shared_.spaces.on_wall(p.at, within);
@@ -455,7 +459,7 @@ TANDEM_HD bool DeepestLine<Team>::step(int from) {
 
 /// Follows the best line to where both bodies end, if that is not known yet.
 template <typename Team>
-TANDEM_HD_CALLED void DeepestLine<Team>::go_to_ends() {
+TANDEM_HD void DeepestLine<Team>::go_to_ends() {
   if (!shared_.is_loose) return;
   const double(&height)[2] = shared_.best.height;
   const double rounding = 16 * bodies_.tolerance();
@@ -499,16 +503,15 @@ TANDEM_HD void DeepestLine<Team>::search_from_seeds(const double& enough) {
 }
 
 template <typename Team>
-TANDEM_HD_CALLED void DeepestLine<Team>::find(const PatchFrame& frame, const Vector3& middle, double reach,
-                                              const double& enough) {
+TANDEM_HD void DeepestLine<Team>::find(const PatchFrame& frame, const Vector3& middle, double reach,
+                                       const double& enough) {
   if (team_.rank() == 0) see(enough);
-  begin_with_seeds(frame, reach);
-  if (!shared_.best.found() || is_deep_enough()) return;
-  begin_half_spaces(middle, reach);
-  if (shared_.best.depth() > kNotFlat * reach && (not_convex_ || goes_on_elsewhere()) &&
-      look_around(middle, reach)) {
+  for (bool again = true, looked = false; again; looked = true) {
     begin_with_seeds(frame, reach);
+    if (!shared_.best.found() || (!looked && is_deep_enough())) return;
     begin_half_spaces(middle, reach);
+    again = !looked && shared_.best.depth() > kNotFlat * reach && (not_convex_ || goes_on_elsewhere()) &&
+            look_around(middle, reach);
   }
   search_from_seeds(enough);
   go_to_ends();

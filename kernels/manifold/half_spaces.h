@@ -74,8 +74,8 @@ class HalfSpaces {
   }
   /// Forgets those beyond which the body goes on. Result: whether there are any.
   template <typename Team>
-  TANDEM_HD_CALLED bool drop_before(const Team& team, const Vector2& at, const double (&height)[2],
-                                    double tolerance) {
+  TANDEM_HD bool drop_before(const Team& team, const Vector2& at, const double (&height)[2],
+                             double tolerance) {
     bool drops = false, any = false;
     for (int i = first_of(team); i < kMost; i += step_of(team)) {
       HalfSpace& of = space[i];
@@ -101,8 +101,8 @@ class HalfSpaces {
   /// Returns the triangle of the half-space that ends nearest to a point of one body's, or kNoIndex if none
   /// ends within a distance.
   template <typename Team>
-  TANDEM_HD_CALLED std::uint32_t nearest_triangle(const Team& team, int side, const Vector2& at,
-                                                  double height, double within = INFINITY) const {
+  TANDEM_HD std::uint32_t nearest_triangle(const Team& team, int side, const Vector2& at, double height,
+                                           double within = INFINITY) const {
     int own = kMost;
     double nearest = within;
     for (int i = first_of(team); i < kMost; i += step_of(team)) {

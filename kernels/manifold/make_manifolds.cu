@@ -11,6 +11,7 @@ namespace tandem::gpu {
 namespace {
 
 using manifold::BodyPair;
+using manifold::DepthSearch;
 using manifold::ManifoldMaker;
 using manifold::Patch;
 using manifold::PatchState;
@@ -295,24 +296,21 @@ __device__ void copy_state(const AnyTeam& team, const PatchState& from, PatchSta
   team.sync();
 }
 
-/// What is known of a deep patch lies where its manifold comes to lie.
-__device__ manifold::DeepPatch& deep_patch(const ManifoldArgs& args, std::uint32_t place) {
-  static_assert(sizeof(manifold::DeepPatch) <= sizeof(Patch) &&
-                alignof(manifold::DeepPatch) <= alignof(Patch));
-  return *reinterpret_cast<manifold::DeepPatch*>(&args.patches[place]);
+/// Where a patch is measured lies where its manifold comes to lie.
+__device__ DepthSearch& depth_search(const ManifoldArgs& args, std::uint32_t place) {
+  static_assert(sizeof(DepthSearch) <= sizeof(Patch) && alignof(DepthSearch) <= alignof(Patch));
+  return *reinterpret_cast<DepthSearch*>(&args.patches[place]);
 }
 
-/// The lines along its directions lie where its state comes to lie.
+/// The lines along the directions of a deep patch lie where its state comes to lie.
 __device__ manifold::DeepLines& deep_lines(BegunPatch& begun) {
   static_assert(sizeof(manifold::DeepLines) <= sizeof(PatchState) &&
                 alignof(manifold::DeepLines) <= alignof(PatchState));
   return *reinterpret_cast<manifold::DeepLines*>(&begun.state);
 }
 
-/// Begins the patch of each curve, and finds directions where the area gives no normal.
+/// Begins the patch of each curve.
 __global__ void __launch_bounds__(kThreads, 4) begin_patches(const __grid_constant__ ManifoldArgs args) {
-  __shared__ WarpWalks walks[kWarps];
-  __shared__ Raw<manifold::SearchMemory> searches[kWarps];
   __shared__ MakerMemory memory[kWarps];
   __shared__ Raw<manifold::OutlineMemory> outline[kWarps];
   __shared__ std::uint32_t places[kWarps];
@@ -322,29 +320,26 @@ __global__ void __launch_bounds__(kThreads, 4) begin_patches(const __grid_consta
   const auto of = [&](const auto& team, std::uint32_t row, std::uint32_t own) {
     constexpr bool kMany = kIsLarge<std::remove_cvref_t<decltype(team)>>;
     const PairCurve curve = args.curves[kMany ? row : args.capacity.contacts - 1 - row];
+    std::uint32_t& place = places[own];
+    if (team.rank() == 0) {
+      place = atomicAdd(&state.next_patch, 1u);
+      if (place >= args.capacity.manifolds)
+        atomicAdd(&state.needed_points, static_cast<Counter>(args.most_points));
+    }
+    team.sync();
+    if (place >= args.capacity.manifolds) return;
     with_maker(args, team, memory[own], curve, [&](auto& maker, const PatchState& made) {
-      maker.begin(curve.curve, outline[own].get());
-      std::uint32_t& place = places[own];
-      if (team.rank() == 0) {
-        place = atomicAdd(&state.next_patch, 1u);
-        if (place >= args.capacity.manifolds)
-          atomicAdd(&state.needed_points, static_cast<Counter>(args.most_points));
-      }
-      team.sync();
-      if (place >= args.capacity.manifolds) return;
+      maker.begin(curve.curve, outline[own].get(), depth_search(args, place));
       const bool is_deep = made.kind == manifold::PatchKind::deep;
       if (team.rank() == 0) {
         args.begun[place].of = curve, args.begun[place].is_deep = is_deep;
         if (is_deep) args.next_of_pair[atomicAdd(&state.deep_patches, 1u)] = place;
       }
-      if (is_deep)
-        maker.begin_deep(curve.curve, outline[own].get(), searches[own].get(), deep_patch(args, place));
-      else
-        copy_state(team, made, args.begun[place].state);
+      copy_state(team, made, args.begun[place].state);
     });
   };
   share_out<kThreads>(state.curves_of_many, state.next_curve_of_many, state.curves_of_few,
-                      state.next_curve_of_few, of, walks);
+                      state.next_curve_of_few, of);
 }
 
 __device__ std::uint32_t patches_begun(const ManifoldArgs& args) {
@@ -352,8 +347,28 @@ __device__ std::uint32_t patches_begun(const ManifoldArgs& args) {
   return wanted < args.capacity.manifolds ? wanted : args.capacity.manifolds;
 }
 
-/// Finds the deepest line of deep patches along each direction, and measures the depths of the others, by a
-/// warp each.
+/// Sounds the rim of each patch, and finds points of the overlap, by a warp.
+__global__ void __launch_bounds__(kThreads, 4) sound_patches(const __grid_constant__ ManifoldArgs args) {
+  __shared__ WarpWalks walks[kWarps];
+  __shared__ MakerMemory memory[kWarps];
+  __shared__ Raw<manifold::SearchMemory> searches[kWarps];
+  __shared__ std::uint32_t taken[kWarps];
+  wait_for_kernel_before();
+  if (!has_query(args)) return;
+  const std::uint32_t own = threadIdx.x / 32;
+  const WarpTeam team(&walks[own]);
+  take_rows(team, patches_begun(args), args.state->next_sounded, taken[own], [&](std::uint32_t row) {
+    BegunPatch& begun = args.begun[row];
+    if (!begun.is_deep && begun.state.kind != manifold::PatchKind::overlap) return;
+    with_maker(args, team, memory[own], begun.of, [&](auto& maker, PatchState& state) {
+      copy_state(team, begun.state, state);
+      maker.sound(begun.of.curve, depth_search(args, row), searches[own].get());
+      if (!begun.is_deep) copy_state(team, state, begun.state);
+    });
+  });
+}
+
+/// Finds the deepest line of each patch, along each direction if it is deep, by a warp.
 __global__ void __launch_bounds__(kThreads, 4) measure_depths(const __grid_constant__ ManifoldArgs args) {
   __shared__ WarpWalks walks[kWarps];
   __shared__ MakerMemory memory[kWarps];
@@ -364,33 +379,28 @@ __global__ void __launch_bounds__(kThreads, 4) measure_depths(const __grid_const
   constexpr std::uint32_t kDirections = 2 * manifold::kMostTried;
   const std::uint32_t own = threadIdx.x / 32, directions = args.state->deep_patches * kDirections;
   const WarpTeam team(&walks[own]);
-  manifold::SearchMemory& search = searches[own].get();
-  const auto along_direction = [&](std::uint32_t place, std::uint32_t direction) {
-    manifold::DeepPatch& patch = deep_patch(args, place);
-    if (direction >= static_cast<std::uint32_t>(patch.directions)) return;
-    BegunPatch& begun = args.begun[place];
-    with_maker(args, team, memory[own], begun.of, [&](auto& maker, PatchState&) {
-      const manifold::OverlapLine line =
-          maker.line_along(begun.of.curve, patch, static_cast<int>(direction), search, patch.enough);
-      if (team.rank() != 0) return;
-      deep_lines(begun).along[direction] = line;
-      // Numbers above 0 are in the order of their bits.
-      atomicMin(reinterpret_cast<Counter*>(&patch.enough),
-                static_cast<Counter>(__double_as_longlong(maker.enough_for_others(line))));
-    });
-  };
-  take_rows(team, directions + patches_begun(args), args.state->next_measured, taken[own],
-            [&](std::uint32_t row) {
-              if (row < directions)
-                return along_direction(args.next_of_pair[row / kDirections], row % kDirections);
-              BegunPatch& begun = args.begun[row - directions];
-              if (begun.is_deep || begun.state.kind != manifold::PatchKind::overlap) return;
-              with_maker(args, team, memory[own], begun.of, [&](auto& maker, PatchState& state) {
-                copy_state(team, begun.state, state);
-                maker.measure_depths(begun.of.curve, search);
-                copy_state(team, state, begun.state);
-              });
-            });
+  // Those of deep patches come first: they take longest.
+  take_rows(
+      team, directions + patches_begun(args), args.state->next_measured, taken[own], [&](std::uint32_t row) {
+        const bool is_deep = row < directions;
+        const std::uint32_t place = is_deep ? args.next_of_pair[row / kDirections] : row - directions,
+                            direction = is_deep ? row % kDirections : 0;
+        BegunPatch& begun = args.begun[place];
+        DepthSearch& search = depth_search(args, place);
+        if (begun.is_deep != is_deep || (!is_deep && begun.state.kind != manifold::PatchKind::overlap) ||
+            direction >= static_cast<std::uint32_t>(search.directions))
+          return;
+        with_maker(args, team, memory[own], begun.of, [&](auto& maker, PatchState&) {
+          const manifold::OverlapLine line = maker.line_along(
+              begun.of.curve, search, static_cast<int>(direction), searches[own].get(), search.enough);
+          if (team.rank() != 0) return;
+          if (!is_deep) return maker.take_deepest(line, memory[own].bodies.get(), begun.state);
+          deep_lines(begun).along[direction] = line;
+          // Numbers above 0 are in the order of their bits.
+          atomicMin(reinterpret_cast<Counter*>(&search.enough),
+                    static_cast<Counter>(__double_as_longlong(maker.enough_for_others(line))));
+        });
+      });
 }
 
 /// Finds the normals, rims and depths of deep patches, by a block each.
@@ -408,7 +418,8 @@ __global__ void __launch_bounds__(kThreads, 4) end_deep_patches(const __grid_con
     const std::uint32_t place = args.next_of_pair[row];
     BegunPatch& begun = args.begun[place];
     with_maker(args, team, memory, begun.of, [&](auto& maker, PatchState& made) {
-      maker.end_deep(begun.of.curve, deep_patch(args, place), deep_lines(begun), outline.get(), lines.get());
+      maker.end_deep(begun.of.curve, depth_search(args, place), deep_lines(begun), outline.get(),
+                     lines.get());
       copy_state(team, made, begun.state);
     });
   });
@@ -505,7 +516,7 @@ __global__ void __launch_bounds__(kThreads) remember(const __grid_constant__ Man
   state.curves_of_many = state.curves_of_few = state.next_curve_of_many = state.next_curve_of_few = 0;
   state.several_curves = state.next_neighbour = state.next_joined = 0;
   state.deep_patches = state.next_ended = 0;
-  state.next_measured = state.next_finished = 0;
+  state.next_sounded = state.next_measured = state.next_finished = 0;
   state.needed_points = state.segments = state.ambiguous_touches = state.open_curves = 0;
   state.too_many_contacts = state.finished_blocks = 0;
   if (!args.match_previous || state.has_last != 0)
@@ -542,6 +553,7 @@ cudaError_t make_patches(const ManifoldArgs& args, cudaStream_t stream) {
   if (error == cudaSuccess) error = launch_after(grid(4, kThreads, 0), try_to_join, args);
   if (error == cudaSuccess) error = launch_after(grid(4, kThreads, 0), join_regions, args);
   if (error == cudaSuccess) error = launch_after(grid(4, kThreads, 0), begin_patches, args);
+  if (error == cudaSuccess) error = launch_after(grid(4, kThreads, 0), sound_patches, args);
   if (error == cudaSuccess) error = launch_after(grid(4, kThreads, 0), measure_depths, args);
   if (error == cudaSuccess) error = launch_after(grid(1, kThreads, 0), end_deep_patches, args);
   return error == cudaSuccess ? launch_after(grid(6, kThreads, 0), finish_patches, args) : error;

@@ -28,8 +28,8 @@ inline constexpr double kShallower = 1e-9;
 /// A rim of so few candidates is measured from two points.
 inline constexpr std::uint32_t kFewCandidates = 32;
 
-/// Makes the patch of a region whose pieces are known, in three steps. A patch's state is all that they hand
-/// on to each other.
+/// Makes the patch of a region whose pieces are known, step by step. A patch's state, and where it is to be
+/// measured, are all that the steps hand on to each other.
 template <typename Team>
 class ManifoldMaker {
  public:
@@ -37,28 +37,32 @@ class ManifoldMaker {
                           const PieceSummary& summary, PatchState& state)
       : team_(team), bodies_(bodies), memory_(memory), summary_(summary), state_(state) {}
 
-  /// Finds normal and rim. A patch of kind `deep` has neither yet: make_deep() is to be called.
-  TANDEM_HD void begin(std::uint32_t region, OutlineMemory& shared);
+  /// Finds normal and rim, or the directions in which a patch of kind `deep` is to be measured.
+  TANDEM_HD void begin(std::uint32_t region, OutlineMemory& shared, DepthSearch& search);
 
-  /// Finds the depths of a patch that is not deep.
-  TANDEM_HD void measure_depths(std::uint32_t region, SearchMemory& shared);
+  /// Finds the surfaces beside the points of the rim, and points of the overlap from which to look for the
+  /// deepest line. Condition, here and below: the patch is an overlap, or deep.
+  TANDEM_HD void sound(std::uint32_t region, DepthSearch& search, SearchMemory& shared);
 
-  /// Finds the direction in which the overlap of a deep patch is shallowest, the rim and depths. The patch is
-  /// ambiguous if the bodies do not overlap along any direction.
-  TANDEM_HD_CALLED void make_deep(std::uint32_t region, OutlineMemory& shared, SearchMemory& depths);
-
-  /// These are the steps of make_deep(), for teams that measure all directions at once: in between they find
-  /// the deepest line along each. The search for it ends as soon as one is as deep as `enough`: that is for
-  /// the others what enough_for_others() says of a line that was found.
-  TANDEM_HD_CALLED void begin_deep(std::uint32_t region, OutlineMemory& shared, SearchMemory& depths,
-                                   DeepPatch& patch);
-  TANDEM_HD_CALLED OverlapLine line_along(std::uint32_t region, const DeepPatch& patch, int direction,
-                                          SearchMemory& depths, const double& enough) const;
+  /// Finds the deepest line along a direction. The search for it ends as soon as one is as deep as `enough`:
+  /// that is for the others what enough_for_others() says of a line that was found.
+  TANDEM_HD OverlapLine line_along(std::uint32_t region, const DepthSearch& search, int direction,
+                                   SearchMemory& shared, const double& enough) const;
   TANDEM_HD static double enough_for_others(const OverlapLine& line) {
     return line.found() ? line.depth() * (1 + 2 * kShallower) : INFINITY;
   }
-  TANDEM_HD_CALLED void end_deep(std::uint32_t region, const DeepPatch& patch, const DeepLines& found,
+
+  /// Takes the deepest line of a patch that is not deep. It is called by one of the team.
+  TANDEM_HD static void take_deepest(const OverlapLine& line, const BodyPair& bodies, PatchState& state);
+
+  /// Finds the direction in which the overlap of a deep patch is shallowest, the rim and depths. The patch is
+  /// ambiguous if the bodies do not overlap along any direction.
+  TANDEM_HD_CALLED void end_deep(std::uint32_t region, const DepthSearch& search, const DeepLines& found,
                                  OutlineMemory& shared, LineMemory& lines);
+
+  /// Does what is to be done between begin() and finish(), along one direction after the other.
+  TANDEM_HD void measure(std::uint32_t region, DepthSearch& search, OutlineMemory& shared,
+                         SearchMemory& depths);
 
   /// Chooses points. new_patch(): where the patch is to lie, or null; called by one of the team.
   template <typename NewPatch>
@@ -72,7 +76,6 @@ class ManifoldMaker {
   TANDEM_HD std::uint32_t ask_at_rim(LineMemory& lines) const;
   TANDEM_HD void take_rim(const LineMemory& lines);
   TANDEM_HD bool goes_through(const OverlapLine& line, LineMemory& lines) const;
-  TANDEM_HD void take_deepest(const OverlapLine& line, bool goes_through);
   TANDEM_HD Vector2 reach_to_rim(const Sounding& s, double (&height)[2]) const;
   TANDEM_HD void place_candidates(const RimFinder<Team>& finder, ChoiceMemory& shared) const;
   TANDEM_HD void keep_apart(int most_of_rim, ChoiceMemory& shared) const;
@@ -157,94 +160,108 @@ TANDEM_HD void ManifoldMaker<Team>::find_rim(std::uint32_t region, const CurveMe
 }
 
 template <typename Team>
-TANDEM_HD void ManifoldMaker<Team>::begin(std::uint32_t region, OutlineMemory& shared) {
+TANDEM_HD void ManifoldMaker<Team>::begin(std::uint32_t region, OutlineMemory& shared, DepthSearch& search) {
   team_.sync();  // all are done with what the last region left
   NormalFinder<Team> normal_finder(team_, bodies_, memory_, summary_, region, shared.normal);
   const CurveMeasure measure = normal_finder.measure();
   if (team_.rank() == 0) shared.measure = measure;
   find_rim(region, measure, normal_finder.find(measure), shared);
-}
-
-template <typename Team>
-TANDEM_HD_CALLED void ManifoldMaker<Team>::begin_deep(std::uint32_t region, OutlineMemory& shared,
-                                                      SearchMemory& depths, DeepPatch& patch) {
-  team_.sync();
-  NormalFinder<Team> normal_finder(team_, bodies_, memory_, summary_, region, shared.normal);
-  const CurveMeasure& measure = shared.measure;
-  const int lines = normal_finder.gather_for_deep(measure);
-  const double reach = normal_finder.reach_from(measure.middle);
-  DeepestLine<Team>(team_, bodies_, memory_, summary_, region, depths)
-      .find_seeds(measure.middle, reach, kMostSeeds);
+  const bool is_deep = state_.kind == PatchKind::deep;
+  const int lines = is_deep ? normal_finder.gather_for_deep(shared.measure) : 1;
+  const double reach = is_deep ? normal_finder.reach_from(shared.measure.middle) : state_.reach;
   if (team_.rank() == 0) {
-    patch.measure = measure, patch.reach = reach, patch.both_ways = shared.normal.both_ways;
-    patch.directions = patch.both_ways ? 2 * lines : lines;
-    patch.enough = INFINITY;
-    for (int i = 0; i < lines; ++i) patch.tried[i] = shared.normal.tried[i];
-    patch.seeds = depths.seeds;
+    search.middle = is_deep ? shared.measure.middle : state_.centre;
+    search.reach = reach;
+    search.both_ways = is_deep && shared.normal.both_ways;
+    search.directions = search.both_ways ? 2 * lines : lines;
+    search.most_seeds = is_deep || state_.candidates > kFewCandidates ? kMostSeeds : kMostSeeds / 2;
+    search.enough = INFINITY;
+    if (state_.kind == PatchKind::overlap) search.tried[0] = state_.frame.n;
+    if (is_deep) {
+      search.measure = shared.measure;
+      for (int i = 0; i < lines; ++i) search.tried[i] = shared.normal.tried[i];
+    }
   }
   team_.sync();
 }
 
 template <typename Team>
-TANDEM_HD_CALLED OverlapLine ManifoldMaker<Team>::line_along(std::uint32_t region, const DeepPatch& patch,
-                                                             int direction, SearchMemory& depths,
-                                                             const double& enough) const {
+TANDEM_HD void ManifoldMaker<Team>::sound(std::uint32_t region, DepthSearch& search, SearchMemory& shared) {
+  const bool has_rim = state_.kind == PatchKind::overlap;
+  DeepestLine<Team>(team_, bodies_, memory_, summary_, region, shared)
+      .find_seeds(search.middle, search.reach, search.most_seeds, has_rim ? ask_at_rim(shared.lines) : 0);
+  if (has_rim) take_rim(shared.lines);
+  if (team_.rank() == 0) search.seeds = shared.seeds;
   team_.sync();
-  if (team_.rank() == 0) depths.seeds = patch.seeds;
-  team_.sync();
-  DeepestLine<Team> search(team_, bodies_, memory_, summary_, region, depths);
-  search.find(PatchFrame(summary_.origin, patch.along(direction)), patch.measure.middle, patch.reach, enough);
-  return search.best();
 }
 
 template <typename Team>
-TANDEM_HD_CALLED void ManifoldMaker<Team>::end_deep(std::uint32_t region, const DeepPatch& patch,
+TANDEM_HD OverlapLine ManifoldMaker<Team>::line_along(std::uint32_t region, const DepthSearch& search,
+                                                      int direction, SearchMemory& shared,
+                                                      const double& enough) const {
+  team_.sync();
+  if (team_.rank() == 0) shared.seeds = search.seeds;
+  team_.sync();
+  DeepestLine<Team> line(team_, bodies_, memory_, summary_, region, shared);
+  line.find(PatchFrame(summary_.origin, search.along(direction)), search.middle, search.reach, enough);
+  return line.best();
+}
+
+template <typename Team>
+TANDEM_HD_CALLED void ManifoldMaker<Team>::end_deep(std::uint32_t region, const DepthSearch& search,
                                                     const DeepLines& found, OutlineMemory& shared,
                                                     LineMemory& lines) {
   double least = INFINITY;
-  for (int i = 0; i < patch.directions; ++i) {
+  for (int i = 0; i < search.directions; ++i) {
     if (found.along[i].found()) least = lesser(found.along[i].depth(), least);
   }
   PatchNormal normal;
   OverlapLine deepest;
-  for (int i = 0; i < patch.directions && normal.kind != PatchKind::overlap; ++i) {
+  for (int i = 0; i < search.directions && normal.kind != PatchKind::overlap; ++i) {
     if (!found.along[i].found() || !(found.along[i].depth() <= least * (1 + kShallower))) continue;
-    normal.n = patch.along(i), normal.kind = PatchKind::overlap;
+    normal.n = search.along(i), normal.kind = PatchKind::overlap;
     deepest = found.along[i];
   }
-  find_rim(region, patch.measure, normal, shared);
+  find_rim(region, search.measure, normal, shared);
   if (state_.kind != PatchKind::overlap) return;
   const std::uint32_t asked = ask_at_rim(lines);
   LineQuestions questions(bodies_, lines.line);
   team_.sync();
   walk_lines(team_, questions, asked);
   take_rim(lines);
-  take_deepest(deepest, goes_through(deepest, lines));
+  const bool through = goes_through(deepest, lines);
+  if (team_.rank() == 0) {
+    state_.goes_through = through;
+    take_deepest(deepest, bodies_, state_);
+  }
+  team_.sync();
 }
 
 template <typename Team>
-TANDEM_HD_CALLED void ManifoldMaker<Team>::make_deep(std::uint32_t region, OutlineMemory& shared,
-                                                     SearchMemory& depths) {
-  DeepPatch patch;
+TANDEM_HD void ManifoldMaker<Team>::measure(std::uint32_t region, DepthSearch& search, OutlineMemory& shared,
+                                            SearchMemory& depths) {
+  if (state_.kind != PatchKind::overlap && state_.kind != PatchKind::deep) return;
+  sound(region, search, depths);
+  if (state_.kind == PatchKind::overlap)
+    return take_deepest(line_along(region, search, 0, depths, search.enough), bodies_, state_);
   DeepLines found;
-  begin_deep(region, shared, depths, patch);
   // The directions along which the first lines are shallowest come first; of others little more is looked at.
   double known[2 * kMostTried];
   const auto depth_of = [](const OverlapLine& line) { return line.found() ? line.depth() : INFINITY; };
   const double none = 0;
-  for (int i = 0; i < patch.directions; ++i) known[i] = depth_of(line_along(region, patch, i, depths, none));
-  double enough = INFINITY;
-  for (int k = 0; k < patch.directions; ++k) {
+  for (int i = 0; i < search.directions; ++i)
+    known[i] = depth_of(line_along(region, search, i, depths, none));
+  for (int k = 0; k < search.directions; ++k) {
     int next = -1;
-    for (int i = 0; i < patch.directions; ++i) {
+    for (int i = 0; i < search.directions; ++i) {
       if (known[i] >= 0 && (next < 0 || known[i] < known[next])) next = i;
     }
-    if (known[next] >= enough) break;  // nor is any of the others shallower
+    if (known[next] >= search.enough) break;  // nor is any of the others shallower
     known[next] = -1;
-    found.along[next] = line_along(region, patch, next, depths, enough);
-    enough = lesser(enough, enough_for_others(found.along[next]));
+    found.along[next] = line_along(region, search, next, depths, search.enough);
+    search.enough = lesser(search.enough, enough_for_others(found.along[next]));
   }
-  end_deep(region, patch, found, shared, depths.lines);
+  end_deep(region, search, found, shared, depths.lines);
 }
 
 /// Asks for the surfaces beside each point of the rim. Result: how many questions these are, the first ones.
@@ -290,30 +307,14 @@ TANDEM_HD bool ManifoldMaker<Team>::goes_through(const OverlapLine& line, LineMe
   return goes;
 }
 
-/// Takes the deepest line. What is no deeper than rounding is a touch.
+/// What is no deeper than rounding is a touch.
 template <typename Team>
-TANDEM_HD void ManifoldMaker<Team>::take_deepest(const OverlapLine& line, bool goes_through) {
-  if (team_.rank() == 0) {
-    if (line.found() && line.depth() > kNoArea * bodies_.reach()) {
-      state_.deepest = line;
-      state_.goes_through = goes_through;
-    } else {
-      state_.kind = PatchKind::touch;
-    }
-  }
-  team_.sync();
-}
-
-template <typename Team>
-TANDEM_HD void ManifoldMaker<Team>::measure_depths(std::uint32_t region, SearchMemory& shared) {
-  if (state_.kind != PatchKind::overlap) return;
-  DeepestLine<Team> search(team_, bodies_, memory_, summary_, region, shared);
-  const int wanted = state_.candidates <= kFewCandidates ? kMostSeeds / 2 : kMostSeeds;
-  search.find_seeds(state_.centre, state_.reach, wanted, ask_at_rim(shared.lines));
-  take_rim(shared.lines);
-  const double enough = INFINITY;
-  search.find(state_.frame, state_.centre, state_.reach, enough);
-  take_deepest(search.best(), false);
+TANDEM_HD void ManifoldMaker<Team>::take_deepest(const OverlapLine& line, const BodyPair& bodies,
+                                                 PatchState& state) {
+  if (line.found() && line.depth() > kNoArea * bodies.reach())
+    state.deepest = line;
+  else
+    state.kind = PatchKind::touch, state.goes_through = false;
 }
 
 /// Returns the place nearest to the point of the rim, on the way to the sounding's line, to which the

@@ -291,6 +291,9 @@ __device__ T over_warp(T value, Sum of) {
     value = of(value, __shfl_xor_sync(0xFFFFFFFFu, value, distance));
   return value;
 }
+__device__ inline std::uint32_t over_warp(std::uint32_t value, Sum) {
+  return __reduce_add_sync(0xFFFFFFFFu, value);
+}
 template <typename T>
 __device__ T over_warp(T value, Greatest) {
   return from_order<T>(greatest_of_lanes(in_order(value)));

@@ -29,51 +29,62 @@ class CurvePlaces {
   /// Returns the place that is nearest to a point. reach: of the pieces.
   TANDEM_HD Place nearest_place(std::uint32_t begin, std::uint32_t end, const Vector3& from,
                                 double reach) const {
-    Place out[1];
-    least_places(begin, end, out, [&](const Piece& piece, Vector3(&at)[1], double(&value)[1]) {
-      at[0] = nearest_on(piece, from, kOffEnd * reach);
-      value[0] = dot(at[0] - from, at[0] - from);
+    std::uint32_t piece[1];
+    least_pieces(begin, end, piece, [&](const Piece& of, double(&value)[1]) {
+      const Vector3 apart = nearest_on(of, from, kOffEnd * reach) - from;
+      value[0] = dot(apart, apart);
     });
-    return out[0];
+    return {nearest_on(memory_.pieces[piece[0]], from, kOffEnd * reach), piece[0]};
   }
   /// Returns the place that has most of a convex function. That is an end of a piece, and none between pieces
   /// into which a straight one is cut.
   template <typename Value>
   TANDEM_HD Place furthest_place(std::uint32_t begin, std::uint32_t end, double reach,
                                  const Value& value) const {
-    Place out[1];
-    furthest_places(
-        begin, end, reach, [&](int, const Vector3& x) { return value(x); }, out);
-    return out[0];
+    std::uint32_t piece[1];
+    Vector3 p, q;
+    least_pieces(begin, end, piece, [&](const Piece& of, double(&least)[1]) {
+      ends_of(of, reach, p, q);
+      least[0] = -greater(value(p), value(q));
+    });
+    ends_of(memory_.pieces[piece[0]], reach, p, q);
+    return {value(p) >= value(q) ? p : q, piece[0]};
   }
-  /// Finds those that have most of several such functions: value(i, x).
+  /// Finds those that have most of several such functions: value(i, x). out: what all of the team see.
   template <int kCount, typename Value>
   TANDEM_HD void furthest_places(std::uint32_t begin, std::uint32_t end, double reach, const Value& value,
-                                 Place (&out)[kCount]) const {
-    least_places(begin, end, out, [&](const Piece& piece, Vector3(&at)[kCount], double(&least)[kCount]) {
-      Vector3 p = piece.end[0], q = p;
-      if (piece.kind() != MeetingKind::polygon) {
-        const Vector3 along = piece.end[1] - p;
-        const double length = norm(along), off_end = kOffEnd * reach;
-        const Vector3 off = (length > 2 * off_end ? off_end / length : 0.5) * along;
-        q = piece.end[1] - off, p = p + off;
-      }
-      for (int i = 0; i < kCount; ++i) {
-        const double of_p = value(i, p), of_q = value(i, q);
-        at[i] = of_p >= of_q ? p : q;
-        least[i] = -greater(of_p, of_q);
-      }
+                                 Place* out) const {
+    std::uint32_t piece[kCount];
+    least_pieces(begin, end, piece, [&](const Piece& of, double(&least)[kCount]) {
+      Vector3 p, q;
+      ends_of(of, reach, p, q);
+      for (int i = 0; i < kCount; ++i) least[i] = -greater(value(i, p), value(i, q));
     });
+    for (int i = static_cast<int>(team_.rank()); i < kCount; i += static_cast<int>(team_.size())) {
+      Vector3 p, q;
+      ends_of(memory_.pieces[piece[i]], reach, p, q);
+      out[i] = {value(i, p) >= value(i, q) ? p : q, piece[i]};
+    }
+    team_.sync();
   }
   /// Returns the point of a piece that is nearest to another one and not too near to its ends.
   TANDEM_HD static Vector3 nearest_on(const Piece& piece, const Vector3& from, double off_end);
 
  private:
-  /// Finds the places of least values; of several that of the least triangles. values_of(piece, at, value):
-  /// where each is on the piece, and how much.
+  /// Finds the pieces of least values; of several that of the least triangles. values_of(piece, values).
   template <int kCount, typename ValuesOf>
-  TANDEM_HD void least_places(std::uint32_t begin, std::uint32_t end, Place (&out)[kCount],
+  TANDEM_HD void least_pieces(std::uint32_t begin, std::uint32_t end, std::uint32_t (&out)[kCount],
                               const ValuesOf& values_of) const;
+
+  /// The ends of a piece, but for a little.
+  TANDEM_HD static void ends_of(const Piece& piece, double reach, Vector3& p, Vector3& q) {
+    p = q = piece.end[0];
+    if (piece.kind() == MeetingKind::polygon) return;
+    const Vector3 along = piece.end[1] - p;
+    const double length = norm(along), off_end = kOffEnd * reach;
+    const Vector3 off = (length > 2 * off_end ? off_end / length : 0.5) * along;
+    q = piece.end[1] - off, p = p + off;
+  }
 
   const Team& team_;
   const PieceMemory& memory_;
@@ -81,10 +92,12 @@ class CurvePlaces {
 
 /// Lines that a team follows at once, each in a frame of its own where that is needed.
 struct LineMemory {
-  static constexpr int kMost = 20;
+  static constexpr int kMost = 20, kMostPlaces = 8;
 
   PatchFrame frame[kMost / 2];  ///< there are two lines in each
   LineQuestion line[kMost];
+  Place place[kMostPlaces];
+  Vector3 inside[kMostPlaces];  ///< points of the overlap, beside the places
 };
 
 /// Follows straight lines through the overlap of two bodies.
@@ -96,20 +109,20 @@ class OverlapLines {
                          LineMemory& shared)
       : team_(team), bodies_(bodies), memory_(memory), shared_(shared) {}
 
-  /// Finds a point of the overlap beside each of some places: half-way from there, behind both triangles, to
-  /// where the overlap ends on that line, but no further than `most`. Result: a bit for each place; 0 where
-  /// its triangles face each other, or the line is not within both bodies. The first questions, `asked`, are
-  /// others'; with them there are at most LineMemory::kMost.
-  TANDEM_HD_CALLED std::uint32_t go_inside(const Place* place, int count, double most, Vector3* inside,
-                                           std::uint32_t asked = 0) const;
+  /// Finds a point of the overlap beside each of the first places: half-way from there, behind both
+  /// triangles, to where the overlap ends on that line, but no further than `most`. Result: a bit for each
+  /// place; 0 where its triangles face each other, or the line is not within both bodies. The first
+  /// questions, `asked`, are others'; with them there are at most LineMemory::kMost.
+  TANDEM_HD std::uint32_t go_inside(int count, double most, std::uint32_t asked = 0) const;
 
   /// Asks where a straight line within a, and one within b, from one point to two others meet the surface of
   /// the body, if they do so before they are there. The point is within both, perhaps hardly: a line that
   /// began further on could begin outside. first: the first of the two questions.
   TANDEM_HD void ask_straight(std::uint32_t first, const Vector3& from, const Vector3 (&to)[2]) const;
 
-  /// Returns whether one of some straight lines stays within both bodies. ends: two of each.
-  TANDEM_HD_CALLED bool any_is_free(const Vector3 (*ends)[2], int count) const;
+  /// Returns whether a straight line from one point inside to the next, of each pair that has a bit, stays
+  /// within both bodies.
+  TANDEM_HD bool any_is_free(std::uint32_t pairs, int count) const;
 
  private:
   /// Lines begin so far behind the surface from which they start.
@@ -137,23 +150,23 @@ TANDEM_HD Vector3 CurvePlaces<Team>::nearest_on(const Piece& piece, const Vector
 
 template <typename Team>
 template <int kCount, typename ValuesOf>
-TANDEM_HD void CurvePlaces<Team>::least_places(std::uint32_t begin, std::uint32_t end, Place (&out)[kCount],
+TANDEM_HD void CurvePlaces<Team>::least_pieces(std::uint32_t begin, std::uint32_t end,
+                                               std::uint32_t (&out)[kCount],
                                                const ValuesOf& values_of) const {
   double least[kCount], value[kCount];
   LeastPiece own[kCount];
-  Vector3 at[kCount];
   for (double& of : least) of = INFINITY;
   for (std::uint32_t i = begin + team_.rank(); i < end; i += team_.size()) {
     const std::uint32_t piece = memory_.order[i];
-    values_of(memory_.pieces[piece], at, value);
+    values_of(memory_.pieces[piece], value);
+    const std::uint64_t key = memory_.pieces[piece].symmetric_key();
     for (int k = 0; k < kCount; ++k) {
       if (value[k] > least[k]) continue;
       if (value[k] < least[k]) least[k] = value[k], own[k] = {};
-      own[k].take(memory_.pieces[piece].symmetric_key(), piece);
+      own[k].take(key, piece);
     }
   }
   std::uint64_t key[kCount];
-  std::uint32_t piece[kCount];
   for (int k = 0; k < kCount; ++k) value[k] = least[k];
   team_.least_ones(least);
   for (int k = 0; k < kCount; ++k) {
@@ -161,21 +174,17 @@ TANDEM_HD void CurvePlaces<Team>::least_places(std::uint32_t begin, std::uint32_
     key[k] = own[k].key;
   }
   team_.least_ones(key);
-  for (int k = 0; k < kCount; ++k) piece[k] = own[k].key == key[k] ? own[k].piece : kNoIndex;
-  team_.least_ones(piece);
-  for (int k = 0; k < kCount; ++k) {
-    values_of(memory_.pieces[piece[k]], at, value);
-    out[k] = {at[k], piece[k]};
-  }
+  for (int k = 0; k < kCount; ++k) out[k] = own[k].key == key[k] ? own[k].piece : kNoIndex;
+  team_.least_ones(out);
 }
 
 template <typename Team>
-TANDEM_HD_CALLED std::uint32_t OverlapLines<Team>::go_inside(const Place* place, int count, double most,
-                                                             Vector3* inside, std::uint32_t asked) const {
+TANDEM_HD std::uint32_t OverlapLines<Team>::go_inside(int count, double most, std::uint32_t asked) const {
   LineQuestions questions(bodies_, shared_.line);
   team_.sync();
   for (int i = static_cast<int>(team_.rank()); i < count; i += static_cast<int>(team_.size())) {
-    const float* n = memory_.normals + 6 * std::size_t{place[i].piece};
+    const Place& place = shared_.place[i];
+    const float* n = memory_.normals + 6 * std::size_t{place.piece};
     const Vector3 sum = {-double{n[0]} - double{n[3]}, -double{n[1]} - double{n[4]},
                          -double{n[2]} - double{n[5]}};
     const double length = norm(sum);
@@ -186,8 +195,8 @@ TANDEM_HD_CALLED std::uint32_t OverlapLines<Team>::go_inside(const Place* place,
       shared_.line[line].side = shared_.line[line + 1].side = -1;
       continue;
     }
-    const Piece& of = memory_.pieces[place[i].piece];
-    Vector3 from = place[i].at;
+    const Piece& of = memory_.pieces[place.piece];
+    Vector3 from = place.at;
     if (of.kind() == MeetingKind::polygon) {
       Meeting meeting;
       meet_again(bodies_, of, meeting);
@@ -203,7 +212,7 @@ TANDEM_HD_CALLED std::uint32_t OverlapLines<Team>::go_inside(const Place* place,
   team_.sync();
   walk_lines(team_, questions, asked + 2 * static_cast<std::uint32_t>(count));
   std::uint32_t found = 0;
-  for (int i = 0; i < count; ++i) {
+  for (int i = static_cast<int>(team_.rank()); i < count; i += static_cast<int>(team_.size())) {
     const LineQuestion* const line = shared_.line + asked + 2 * i;
     if (line->side < 0) continue;
     double end = most;
@@ -215,10 +224,11 @@ TANDEM_HD_CALLED std::uint32_t OverlapLines<Team>::go_inside(const Place* place,
                (!bodies_[side].shape->closed || (crossing.found() && leaves(side, crossing, line->frame->n)));
       if (crossing.found()) end = lesser(crossing.height, end);
     }
-    inside[i] = line->frame->at({}, end / 2);
+    shared_.inside[i] = line->frame->at({}, end / 2);
     found |= within ? 1u << i : 0u;
   }
-  team_.sync();  // all have read the answers
+  found = team_.sum(found);
+  team_.sync();  // all see the points
   return found;
 }
 
@@ -241,16 +251,22 @@ TANDEM_HD void OverlapLines<Team>::ask_straight(std::uint32_t first, const Vecto
 }
 
 template <typename Team>
-TANDEM_HD_CALLED bool OverlapLines<Team>::any_is_free(const Vector3 (*ends)[2], int count) const {
+TANDEM_HD bool OverlapLines<Team>::any_is_free(std::uint32_t pairs, int count) const {
   team_.sync();
-  for (int i = 0; i < count; ++i)
-    ask_straight(2 * static_cast<std::uint32_t>(i), ends[i][0], {ends[i][1], ends[i][1]});
+  for (int i = 0; i < count; ++i) {
+    const Vector3& to = shared_.inside[2 * i + 1];
+    if ((pairs >> i & 1u) != 0)
+      ask_straight(2 * static_cast<std::uint32_t>(i), shared_.inside[2 * i], {to, to});
+    else if (team_.rank() == 0)
+      shared_.line[2 * i].side = shared_.line[2 * i + 1].side = -1;
+  }
   team_.sync();
   LineQuestions questions(bodies_, shared_.line);
   walk_lines(team_, questions, 2 * static_cast<std::uint32_t>(count));
   bool any = false;
   for (int i = 0; i < count; ++i)
-    any = any || (!shared_.line[2 * i].best.found() && !shared_.line[2 * i + 1].best.found());
+    any = any || ((pairs >> i & 1u) != 0 && !shared_.line[2 * i].best.found() &&
+                  !shared_.line[2 * i + 1].best.found());
   team_.sync();  // all have read the answers
   return any;
 }

@@ -41,11 +41,8 @@ struct alignas(64) PairPatches {
       return enough_memory ? &patches[patches.size() - 1] : nullptr;
     };
     for (std::uint32_t region = 0; region < summary.curves; ++region) {
-      maker.begin(region, outline_);
-      if (state_.kind == manifold::PatchKind::deep)
-        maker.make_deep(region, outline_, depths_);
-      else
-        maker.measure_depths(region, depths_);
+      maker.begin(region, outline_, search_);
+      maker.measure(region, search_, outline_, depths_);
       ambiguous_touches += state_.kind == manifold::PatchKind::ambiguous;
       maker.finish(region, most_points, choice_, new_patch);
     }
@@ -73,6 +70,7 @@ struct alignas(64) PairPatches {
   manifold::RegionMemory regions_;
   manifold::OutlineMemory outline_;
   manifold::SearchMemory depths_;
+  manifold::DepthSearch search_;
   manifold::ChoiceMemory choice_;
 };
 

@@ -204,11 +204,12 @@ struct PatchState {
   std::uint32_t candidates;
 };
 
-/// A patch whose overlap is to be measured along many directions.
-struct DeepPatch {
-  CurveMeasure measure;
-  double reach;  ///< of the pieces, from their middle
-  int directions;
+/// Where the overlap of a patch is to be measured: along its normal, or along many directions if it is deep.
+struct DepthSearch {
+  CurveMeasure measure;  ///< of a deep patch
+  Vector3 middle;
+  double reach;  ///< from the middle to the rim; of a deep patch, to all pieces
+  int directions, most_seeds;
   bool both_ways;  ///< along each line that is tried
   double enough;   ///< for the lines along other directions, where several are looked for at once
   Vector3 tried[kMostTried];

@@ -89,26 +89,21 @@ TANDEM_HD bool RegionFinder<Team>::is_joined(std::uint32_t i, std::uint32_t j) {
   };
   constexpr int kAttempts = 2;
   const Place first = place_in(i);
-  Place place[2 * kAttempts];
   double most = 0;
+  team_.sync();  // all are done with the places before
   for (int k = 0; k < kAttempts; ++k) {
-    Place* const ends = place + 2 * k;
-    ends[0] = k == 0
-                  ? nearest(i, nearest(j, first))
-                  : places.furthest_place(memory_.start[i], memory_.start[i + 1], summary_.unit,
-                                          [&](const Vector3& x) { return dot(x - first.at, x - first.at); });
-    ends[1] = nearest(j, ends[0]);
-    most = greater(norm(ends[1].at - ends[0].at), most);
+    const Place from =
+        k == 0 ? nearest(i, nearest(j, first))
+               : places.furthest_place(memory_.start[i], memory_.start[i + 1], summary_.unit,
+                                       [&](const Vector3& x) { return dot(x - first.at, x - first.at); });
+    const Place to = nearest(j, from);
+    if (team_.rank() == 0) shared_->lines.place[2 * k] = from, shared_->lines.place[2 * k + 1] = to;
+    most = greater(norm(to.at - from.at), most);
   }
-  Vector3 inside[kAttempts][2];
-  const std::uint32_t found = lines.go_inside(place, 2 * kAttempts, most, inside[0]);
-  int count = 0;
-  for (int k = 0; k < kAttempts; ++k) {
-    if ((found >> (2 * k) & 3u) != 3) continue;
-    for (int end = 0; end < 2; ++end) inside[count][end] = inside[k][end];
-    ++count;
-  }
-  return count > 0 && lines.any_is_free(inside, count);
+  const std::uint32_t found = lines.go_inside(2 * kAttempts, most);
+  std::uint32_t pairs = 0;
+  for (int k = 0; k < kAttempts; ++k) pairs |= (found >> (2 * k) & 3u) == 3 ? 1u << k : 0u;
+  return pairs != 0 && lines.any_is_free(pairs, kAttempts);
 }
 
 /// Returns whether the area vectors of the curves of a region add up, rather than cancel. Then the region is

@@ -82,11 +82,23 @@ class DeepestLine {
         end_(memory.start[region + 1]),
         shared_(shared) {}
 
-  /// Finds points of the overlap beside some pieces, `wanted` at most; find() needs them. middle: of the
-  /// pieces. The first questions, `asked`, are others', and are answered too.
-  TANDEM_HD void find_seeds(const Vector3& middle, double reach, int wanted, std::uint32_t asked = 0);
+  /// Finds places on the curve that lie far from each other: the nearest to the middle, the furthest from
+  /// that, and the furthest off the line of these on either side. wanted: 4 at most.
+  TANDEM_HD static void find_places(const Team& team, const PieceMemory& memory, std::uint32_t region,
+                                    const Vector3& middle, double reach, int wanted, Seeds& out);
 
-  /// Returns what find() found.
+  /// Goes from such places to points of the overlap beside them. The first questions, `asked`, are others',
+  /// and are answered too.
+  TANDEM_HD void go_inside(Seeds& seeds, std::uint32_t asked);
+
+  /// Takes such points. This comes before the functions below.
+  TANDEM_HD void begin(const Seeds& seeds) {
+    team_.sync();
+    if (team_.rank() == 0) shared_.seeds = seeds;
+    team_.sync();
+  }
+
+  /// Returns what was found.
   TANDEM_HD OverlapLine best() const {
     const OverlapLine best = shared_.best;
     team_.sync();  // all have read it
@@ -137,36 +149,44 @@ class DeepestLine {
 };
 
 template <typename Team>
-TANDEM_HD void DeepestLine<Team>::find_seeds(const Vector3& middle, double reach, int wanted,
-                                             std::uint32_t asked) {
-  const OverlapLines<Team> lines(team_, bodies_, memory_, shared_.lines);
-  const CurvePlaces<Team> places(team_, memory_);
-  // The nearest to the middle, the furthest from that, and the furthest off the line of these on either side.
-  Place next = places.nearest_place(begin_, end_, middle, reach);
+TANDEM_HD void DeepestLine<Team>::find_places(const Team& team, const PieceMemory& memory,
+                                              std::uint32_t region, const Vector3& middle, double reach,
+                                              int wanted, Seeds& out) {
+  const std::uint32_t begin = memory.start[region], end = memory.start[region + 1];
+  const CurvePlaces<Team> places(team, memory);
+  Place next = places.nearest_place(begin, end, middle, reach);
   const Vector3 first = next.at;
   Vector3 along, across;
   for (int i = 0;; ++i) {
-    if (team_.rank() == 0) shared_.lines.place[i] = next;
+    if (team.rank() == 0) out.at[i] = next.at, out.beside[i] = next.piece, out.count = i + 1;
     if (i + 1 == wanted) break;
     if (i == 1) along = next.at - first;
     if (i == 2) across = cross(cross(along, next.at - first), along);
-    next = places.furthest_place(begin_, end_, reach, [&](const Vector3& x) {
+    next = places.furthest_place(begin, end, reach, [&](const Vector3& x) {
       const Vector3 from = x - first;
       if (i == 0) return dot(from, from);
       const Vector3 off = cross(along, from);
       return i == 1 ? dot(off, off) : -dot(across, from);
     });
   }
+  team.sync();
+}
+
+template <typename Team>
+TANDEM_HD void DeepestLine<Team>::go_inside(Seeds& seeds, std::uint32_t asked) {
+  const OverlapLines<Team> lines(team_, bodies_, memory_, shared_.lines);
+  const int count = seeds.count;
+  for (int i = static_cast<int>(team_.rank()); i < count; i += static_cast<int>(team_.size()))
+    shared_.lines.place[i] = {seeds.at[i], seeds.beside[i]};
   const double most = greater(bodies_.a.shape->diagonal, bodies_.b.shape->diagonal);
-  const std::uint32_t found = lines.go_inside(wanted, most, asked);
+  const std::uint32_t found = lines.go_inside(count, most, asked);
   if (team_.rank() == 0) {
-    int count = 0;
-    for (int i = 0; i < wanted; ++i) {
+    seeds.count = 0;
+    for (int i = 0; i < count; ++i) {
       if ((found >> i & 1u) == 0) continue;
-      shared_.seeds.at[count] = shared_.lines.inside[i];
-      shared_.seeds.beside[count++] = shared_.lines.place[i].piece;
+      seeds.at[seeds.count] = shared_.lines.inside[i];
+      seeds.beside[seeds.count++] = shared_.lines.place[i].piece;
     }
-    shared_.seeds.count = count;
   }
   team_.sync();
 }
@@ -194,6 +214,7 @@ TANDEM_HD int DeepestLine<Team>::follow_lines_through(const PointAt& point_at, i
   if (wanted != 0) walk_lines(team_, questions, 2 * static_cast<std::uint32_t>(count));
   int deepest = -1;
   depth = 0;
+  TANDEM_ROLLED
   for (int i = 0; i < count; ++i) {
     if ((wanted >> i & 1u) == 0) continue;
     const Crossing &top = line[2 * i].best, &bottom = line[2 * i + 1].best;
@@ -230,6 +251,7 @@ template <typename Team>
 TANDEM_HD bool DeepestLine<Team>::goes_on_elsewhere() const {
   constexpr std::uint32_t kCorners = 32;  // of each body
   bool goes_on = false;
+  TANDEM_ROLLED
   for (std::uint32_t i = team_.rank(); i < 2 * kCorners; i += team_.size()) {
     const int side = static_cast<int>(i % 2);
     const Shape& shape = *bodies_[side].shape;
@@ -271,6 +293,7 @@ TANDEM_HD bool DeepestLine<Team>::look_around(const Vector3& middle, double reac
   const Place* const place = shared_.lines.place;
   const Vector3* const inside = shared_.lines.inside;
   const auto point = [&](int i, int k) { return place[i].at + (0.4 + 0.8 * k) * (inside[i] - place[i].at); };
+  TANDEM_ROLLED
   for (int k = 0; k < kPoints; ++k) {
     double depth;
     const int here = follow_lines_through([&](int i) { return point(i, k); }, kPlaces, found, reach, depth);
@@ -331,6 +354,7 @@ TANDEM_HD void DeepestLine<Team>::begin_half_spaces(const Vector3& middle, doubl
   }
   static_assert(HalfSpaces::kFirst == 4 * kMostSeeds);
   const int count = 4 * shared_.seeds.count;
+  TANDEM_ROLLED
   for (int i = static_cast<int>(team_.rank()); i < HalfSpaces::kMost; i += static_cast<int>(team_.size())) {
     HalfSpace& space = shared_.spaces.space[i];
     if (i >= count) {
@@ -343,6 +367,7 @@ TANDEM_HD void DeepestLine<Team>::begin_half_spaces(const Vector3& middle, doubl
     space.counts = false;
   }
   team_.sync();
+  TANDEM_ROLLED
   for (int i = 0; i < shared_.seeds.count; ++i) {
     const LineQuestion &top = shared_.lines.line[2 * i], &bottom = shared_.lines.line[2 * i + 1];
     if (top.best.found() && bottom.best.found()) go_beyond(top.at, {top.best.height, bottom.best.height});
@@ -390,6 +415,7 @@ TANDEM_HD OverlapLine DeepestLine<Team>::line_that_counts(int from, bool& is_loo
   } else {
     const bool on_wall = shared_.spaces.on_wall(p.at, within);
     out.at = p.at;
+    TANDEM_ROLLED
     for (int side = 0; side < 2; ++side) {
       const Crossing& end = line[side].best;
       const double further = side == 0 ? end.height - p.height[0] : p.height[1] - end.height;

@@ -117,6 +117,7 @@ class HalfSpaces {
   /// Returns whether a point of a body lies beyond one of its half-spaces.
   TANDEM_HD bool any_before(int side, const Vector2& at, double height, double tolerance) const {
     bool is = false;
+    TANDEM_ROLLED
     for (int i = 0; i < kMost; ++i)
       is = is || (space[i].triangle != kNoIndex && space[i].side == side &&
                   space[i].beyond(at, height) > tolerance);

@@ -197,8 +197,6 @@ __global__ void __launch_bounds__(kFinders, 2) find_curves(const __grid_constant
       if (summary.segments > 0) atomicAdd(&state.segments, Counter{summary.segments});
     }
     if (!manifold::RegionFinder<AnyTeam>::may_join(summary)) return;
-    const PieceMemory memory = memory_of(args, pair);
-    manifold::RegionFinder<AnyTeam>(team, bodies, memory, summary, nullptr).begin();
     if (team.rank() == 0) next[own] = atomicAdd(&state.several_curves, summary.curves);
     team.sync();
     const std::uint32_t first = next[own];
@@ -207,6 +205,22 @@ __global__ void __launch_bounds__(kFinders, 2) find_curves(const __grid_constant
     team.sync();
   };
   share_out<kFinders>(groups.counts->many, state.next_many, groups.counts->few, state.next_few, of);
+}
+
+/// Finds what is known of each curve before it is joined with others, by a warp.
+__global__ void __launch_bounds__(kThreads, 6) begin_to_join(const __grid_constant__ ManifoldArgs args) {
+  __shared__ Raw<BodyPair> shared_bodies[kWarps];
+  __shared__ std::uint32_t taken[kWarps];
+  wait_for_kernel_before();
+  if (!has_query(args)) return;
+  const std::uint32_t own = threadIdx.x / 32;
+  const WarpTeam team(nullptr);
+  take_rows(team, args.state->several_curves, args.state->next_to_join, taken[own], [&](std::uint32_t row) {
+    const PairCurve curve = args.curves[row];
+    manifold::RegionFinder<WarpTeam>(team, shared_bodies[own].get(), memory_of(args, curve.pair),
+                                     args.summaries[curve.pair], nullptr)
+        .begin(curve.curve);
+  });
 }
 
 /// Tries to join each curve of pairs of several with its neighbours, by a warp each.
@@ -379,28 +393,28 @@ __global__ void __launch_bounds__(kThreads, 4) measure_depths(const __grid_const
   constexpr std::uint32_t kDirections = 2 * manifold::kMostTried;
   const std::uint32_t own = threadIdx.x / 32, directions = args.state->deep_patches * kDirections;
   const WarpTeam team(&walks[own]);
-  // Those of deep patches come first: they take longest.
-  take_rows(
-      team, directions + patches_begun(args), args.state->next_measured, taken[own], [&](std::uint32_t row) {
-        const bool is_deep = row < directions;
-        const std::uint32_t place = is_deep ? args.next_of_pair[row / kDirections] : row - directions,
-                            direction = is_deep ? row % kDirections : 0;
-        BegunPatch& begun = args.begun[place];
-        DepthSearch& search = depth_search(args, place);
-        if (begun.is_deep != is_deep || (!is_deep && begun.state.kind != manifold::PatchKind::overlap) ||
-            direction >= static_cast<std::uint32_t>(search.directions))
-          return;
-        with_maker(args, team, memory[own], begun.of, [&](auto& maker, PatchState&) {
-          const manifold::OverlapLine line = maker.line_along(
-              begun.of.curve, search, static_cast<int>(direction), searches[own].get(), search.enough);
-          if (team.rank() != 0) return;
-          if (!is_deep) return maker.take_deepest(line, memory[own].bodies.get(), begun.state);
-          deep_lines(begun).along[direction] = line;
-          // Numbers above 0 are in the order of their bits.
-          atomicMin(reinterpret_cast<Counter*>(&search.enough),
-                    static_cast<Counter>(__double_as_longlong(maker.enough_for_others(line))));
-        });
-      });
+  const auto measure = [&](std::uint32_t row) {
+    // Deep patches come first: they take longest.
+    const bool is_deep = row < directions;
+    const std::uint32_t place = is_deep ? args.next_of_pair[row / kDirections] : row - directions;
+    const int direction = static_cast<int>(is_deep ? row % kDirections : 0);
+    BegunPatch& begun = args.begun[place];
+    DepthSearch& search = depth_search(args, place);
+    if (begun.is_deep != is_deep || (!is_deep && begun.state.kind != manifold::PatchKind::overlap) ||
+        direction >= search.directions)
+      return;
+    with_maker(args, team, memory[own], begun.of, [&](auto& maker, PatchState&) {
+      const manifold::OverlapLine line =
+          maker.line_along(begun.of.curve, search, direction, searches[own].get());
+      if (team.rank() != 0) return;
+      if (!is_deep) return maker.take_deepest(line, memory[own].bodies.get(), begun.state);
+      deep_lines(begun).along[direction] = line;
+      // Numbers above 0 are in the order of their bits.
+      atomicMin(reinterpret_cast<Counter*>(&search.enough),
+                static_cast<Counter>(__double_as_longlong(manifold::enough_for_others(line))));
+    });
+  };
+  take_rows(team, directions + patches_begun(args), args.state->next_measured, taken[own], measure);
 }
 
 /// Finds the normals, rims and depths of deep patches, by a block each.
@@ -514,7 +528,7 @@ __global__ void __launch_bounds__(kThreads) remember(const __grid_constant__ Man
   if (atomicAdd(&state.finished_blocks, 1u) + 1 != gridDim.x) return;
   state.next_many = state.next_few = state.next_patch = state.tiles_taken = 0;
   state.curves_of_many = state.curves_of_few = state.next_curve_of_many = state.next_curve_of_few = 0;
-  state.several_curves = state.next_neighbour = state.next_joined = 0;
+  state.several_curves = state.next_to_join = state.next_neighbour = state.next_joined = 0;
   state.deep_patches = state.next_ended = 0;
   state.next_sounded = state.next_measured = state.next_finished = 0;
   state.needed_points = state.segments = state.ambiguous_touches = state.open_curves = 0;
@@ -550,12 +564,13 @@ cudaError_t make_patches(const ManifoldArgs& args, cudaStream_t stream) {
   };
   cudaError_t error = launch_after(grid(3, kThreads, 0), make_pieces, args);
   if (error == cudaSuccess) error = launch_after(grid(2, kFinders, kNearBytes), find_curves, args);
+  if (error == cudaSuccess) error = launch_after(grid(6, kThreads, 0), begin_to_join, args);
   if (error == cudaSuccess) error = launch_after(grid(4, kThreads, 0), try_to_join, args);
   if (error == cudaSuccess) error = launch_after(grid(4, kThreads, 0), join_regions, args);
   if (error == cudaSuccess) error = launch_after(grid(4, kThreads, 0), begin_patches, args);
   if (error == cudaSuccess) error = launch_after(grid(4, kThreads, 0), sound_patches, args);
   if (error == cudaSuccess) error = launch_after(grid(4, kThreads, 0), measure_depths, args);
-  if (error == cudaSuccess) error = launch_after(grid(1, kThreads, 0), end_deep_patches, args);
+  if (error == cudaSuccess) error = launch_after(grid(3, kThreads, 0), end_deep_patches, args);
   return error == cudaSuccess ? launch_after(grid(6, kThreads, 0), finish_patches, args) : error;
 }
 

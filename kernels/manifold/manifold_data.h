@@ -65,8 +65,8 @@ struct ManifoldState {
   // Cleared by each call.
   std::uint32_t next_many, next_few, next_patch, tiles_taken;
   std::uint32_t curves_of_many, curves_of_few, next_curve_of_many, next_curve_of_few;
-  std::uint32_t several_curves, next_neighbour, next_joined, deep_patches, next_sounded, next_measured,
-      next_ended, next_finished;
+  std::uint32_t several_curves, next_to_join, next_neighbour, next_joined, deep_patches, next_sounded,
+      next_measured, next_ended, next_finished;
   Counter needed_points, segments, ambiguous_touches, open_curves;
   std::uint32_t too_many_contacts, finished_blocks;
 

@@ -22,9 +22,6 @@ inline constexpr double kAsDeep = 1e-6;
 /// A point is outside a triangle if its share of a corner is further below 0 than this.
 inline constexpr double kOutside = 1e-12;
 
-/// A direction is better than another only if the overlap along it is less by more than this part.
-inline constexpr double kShallower = 1e-9;
-
 /// A rim of so few candidates is measured from two points.
 inline constexpr std::uint32_t kFewCandidates = 32;
 
@@ -37,20 +34,22 @@ class ManifoldMaker {
                           const PieceSummary& summary, PatchState& state)
       : team_(team), bodies_(bodies), memory_(memory), summary_(summary), state_(state) {}
 
-  /// Finds normal and rim, or the directions in which a patch of kind `deep` is to be measured.
+  /// Finds normal and rim, or the directions in which a patch of kind `deep` is to be measured, and places
+  /// beside which points of the overlap are looked for.
   TANDEM_HD void begin(std::uint32_t region, OutlineMemory& shared, DepthSearch& search);
 
   /// Finds the surfaces beside the points of the rim, and points of the overlap from which to look for the
   /// deepest line. Condition, here and below: the patch is an overlap, or deep.
   TANDEM_HD void sound(std::uint32_t region, DepthSearch& search, SearchMemory& shared);
 
-  /// Finds the deepest line along a direction. The search for it ends as soon as one is as deep as `enough`:
-  /// that is for the others what enough_for_others() says of a line that was found.
+  /// Finds the deepest line along a direction. The search for it ends as soon as one is as deep as
+  /// search.enough.
   TANDEM_HD OverlapLine line_along(std::uint32_t region, const DepthSearch& search, int direction,
-                                   SearchMemory& shared, const double& enough) const;
-  TANDEM_HD static double enough_for_others(const OverlapLine& line) {
-    return line.found() ? line.depth() * (1 + 2 * kShallower) : INFINITY;
-  }
+                                   SearchMemory& shared) const;
+
+  /// Finds how deep the overlap is along a direction at least.
+  TANDEM_HD double least_depth_along(std::uint32_t region, const DepthSearch& search, int direction,
+                                     SearchMemory& shared) const;
 
   /// Takes the deepest line of a patch that is not deep. It is called by one of the team.
   TANDEM_HD static void take_deepest(const OverlapLine& line, const BodyPair& bodies, PatchState& state);
@@ -174,7 +173,6 @@ TANDEM_HD void ManifoldMaker<Team>::begin(std::uint32_t region, OutlineMemory& s
     search.reach = reach;
     search.both_ways = is_deep && shared.normal.both_ways;
     search.directions = search.both_ways ? 2 * lines : lines;
-    search.most_seeds = is_deep || state_.candidates > kFewCandidates ? kMostSeeds : kMostSeeds / 2;
     search.enough = INFINITY;
     if (state_.kind == PatchKind::overlap) search.tried[0] = state_.frame.n;
     if (is_deep) {
@@ -183,28 +181,36 @@ TANDEM_HD void ManifoldMaker<Team>::begin(std::uint32_t region, OutlineMemory& s
     }
   }
   team_.sync();
+  if (state_.kind != PatchKind::overlap && !is_deep) return;
+  const int wanted = is_deep || state_.candidates > kFewCandidates ? kMostSeeds : kMostSeeds / 2;
+  DeepestLine<Team>::find_places(team_, memory_, region, search.middle, search.reach, wanted, search.seeds);
 }
 
 template <typename Team>
 TANDEM_HD void ManifoldMaker<Team>::sound(std::uint32_t region, DepthSearch& search, SearchMemory& shared) {
   const bool has_rim = state_.kind == PatchKind::overlap;
   DeepestLine<Team>(team_, bodies_, memory_, summary_, region, shared)
-      .find_seeds(search.middle, search.reach, search.most_seeds, has_rim ? ask_at_rim(shared.lines) : 0);
+      .go_inside(search.seeds, has_rim ? ask_at_rim(shared.lines) : 0);
   if (has_rim) take_rim(shared.lines);
-  if (team_.rank() == 0) search.seeds = shared.seeds;
-  team_.sync();
 }
 
 template <typename Team>
 TANDEM_HD OverlapLine ManifoldMaker<Team>::line_along(std::uint32_t region, const DepthSearch& search,
-                                                      int direction, SearchMemory& shared,
-                                                      const double& enough) const {
-  team_.sync();
-  if (team_.rank() == 0) shared.seeds = search.seeds;
-  team_.sync();
+                                                      int direction, SearchMemory& shared) const {
   DeepestLine<Team> line(team_, bodies_, memory_, summary_, region, shared);
-  line.find(PatchFrame(summary_.origin, search.along(direction)), search.middle, search.reach, enough);
+  line.begin(search.seeds);
+  line.find(PatchFrame(summary_.origin, search.along(direction)), search.middle, search.reach, search.enough);
   return line.best();
+}
+
+template <typename Team>
+TANDEM_HD double ManifoldMaker<Team>::least_depth_along(std::uint32_t region, const DepthSearch& search,
+                                                        int direction, SearchMemory& shared) const {
+  DeepestLine<Team> line(team_, bodies_, memory_, summary_, region, shared);
+  line.begin(search.seeds);
+  line.begin_with_seeds(PatchFrame(summary_.origin, search.along(direction)), search.reach);
+  const OverlapLine best = line.best();
+  return best.found() ? best.depth() : INFINITY;
 }
 
 template <typename Team>
@@ -243,22 +249,19 @@ TANDEM_HD void ManifoldMaker<Team>::measure(std::uint32_t region, DepthSearch& s
   if (state_.kind != PatchKind::overlap && state_.kind != PatchKind::deep) return;
   sound(region, search, depths);
   if (state_.kind == PatchKind::overlap)
-    return take_deepest(line_along(region, search, 0, depths, search.enough), bodies_, state_);
+    return take_deepest(line_along(region, search, 0, depths), bodies_, state_);
   DeepLines found;
   // The directions along which the first lines are shallowest come first; of others little more is looked at.
   double known[2 * kMostTried];
-  const auto depth_of = [](const OverlapLine& line) { return line.found() ? line.depth() : INFINITY; };
-  const double none = 0;
-  for (int i = 0; i < search.directions; ++i)
-    known[i] = depth_of(line_along(region, search, i, depths, none));
-  for (int k = 0; k < search.directions; ++k) {
+  for (int i = 0; i < search.directions; ++i) known[i] = least_depth_along(region, search, i, depths);
+  for (;;) {
     int next = -1;
     for (int i = 0; i < search.directions; ++i) {
-      if (known[i] >= 0 && (next < 0 || known[i] < known[next])) next = i;
+      if (known[i] >= 0 && known[i] < (next < 0 ? search.enough : known[next])) next = i;
     }
-    if (known[next] >= search.enough) break;  // nor is any of the others shallower
+    if (next < 0) break;  // none of the others is shallower
     known[next] = -1;
-    found.along[next] = line_along(region, search, next, depths, search.enough);
+    found.along[next] = line_along(region, search, next, depths);
     search.enough = lesser(search.enough, enough_for_others(found.along[next]));
   }
   end_deep(region, search, found, shared, depths.lines);

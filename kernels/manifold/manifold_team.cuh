@@ -285,14 +285,18 @@ __device__ inline Counter greatest_of_lanes(Counter number) {
   return Counter{greatest} << 32 | greatest_of_lanes(upper == greatest ? lower : 0u);
 }
 
+/// A whole number: sums of any kind wrap around.
 template <typename T>
-__device__ T over_warp(T value, Sum of) {
-  for (int distance = 16; distance > 0; distance /= 2)
-    value = of(value, __shfl_xor_sync(0xFFFFFFFFu, value, distance));
-  return value;
-}
-__device__ inline std::uint32_t over_warp(std::uint32_t value, Sum) {
-  return __reduce_add_sync(0xFFFFFFFFu, value);
+__device__ T over_warp(T value, Sum) {
+  const auto sum = [](std::uint64_t part) {
+    return __reduce_add_sync(0xFFFFFFFFu, static_cast<std::uint32_t>(part));
+  };
+  if constexpr (sizeof(T) == 4) return static_cast<T>(sum(static_cast<std::uint64_t>(value)));
+  // Parts of 27 bits: the sum of 32 of them fits.
+  constexpr std::uint64_t kPart = (std::uint64_t{1} << 27) - 1;
+  const auto bits = static_cast<std::uint64_t>(value);
+  const std::uint64_t lower = sum(bits & kPart), middle = sum(bits >> 27 & kPart), upper = sum(bits >> 54);
+  return static_cast<T>(lower + (middle << 27) + (upper << 54));
 }
 template <typename T>
 __device__ T over_warp(T value, Greatest) {

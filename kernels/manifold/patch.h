@@ -67,6 +67,9 @@ struct Spread {
   double highest_a, lowest_b;
 };
 
+/// A direction is better than another only if the overlap along it is less by more than this part.
+inline constexpr double kShallower = 1e-9;
+
 /// The most directions that are tried for a normal.
 inline constexpr int kMostTried = 11;
 
@@ -209,17 +212,22 @@ struct DepthSearch {
   CurveMeasure measure;  ///< of a deep patch
   Vector3 middle;
   double reach;  ///< from the middle to the rim; of a deep patch, to all pieces
-  int directions, most_seeds;
+  int directions, places;
   bool both_ways;  ///< along each line that is tried
-  double enough;   ///< for the lines along other directions, where several are looked for at once
+  double enough;   ///< no line along another direction needs to be deeper
   Vector3 tried[kMostTried];
-  Seeds seeds;
+  Seeds seeds;  ///< at first, places on the curve
 
   TANDEM_HD Vector3 along(int i) const {
     if (!both_ways) return tried[i];
     return i % 2 == 0 ? tried[i / 2] : -tried[i / 2];
   }
 };
+
+/// Returns how deep a line along any other direction is if it need not be looked at, as one was found.
+TANDEM_HD inline double enough_for_others(const OverlapLine& line) {
+  return line.found() ? line.depth() * (1 + 2 * kShallower) : INFINITY;
+}
 
 /// The deepest line along each direction of a deep patch; none where that is not known to be the shallowest.
 struct DeepLines {

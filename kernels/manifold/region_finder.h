@@ -17,7 +17,7 @@ struct RegionMemory {
 template <typename Team>
 class RegionFinder {
  public:
-  /// shared: what all of the team see; begin() needs none.
+  /// shared: what all of the team see; only try_to_join() and join() need it.
   TANDEM_HD RegionFinder(const Team& team, const BodyPair& bodies, const PieceMemory& memory,
                          const PieceSummary& summary, RegionMemory* shared)
       : team_(team), bodies_(bodies), memory_(memory), summary_(summary), shared_(shared) {}
@@ -27,15 +27,16 @@ class RegionFinder {
 
   /// Returns whether there are curves to be joined; not if there are too many.
   TANDEM_HD static bool may_join(const PieceSummary& summary) {
-    return summary.curves > 1 && summary.curves < 256;  // a partner's number takes a byte
+    return summary.curves > 1 && summary.curves < 256;  // a number takes a byte
   }
 
   /// Returns how many regions there are; afterwards `order` and `start` have them instead of curves, and the
   /// first piece of a region whose curves cancel each other is marked as joined.
   TANDEM_HD std::uint32_t find();
 
-  /// These are the steps of find() where curves may be joined. Teams may try all neighbours at once.
-  TANDEM_HD void begin();
+  /// These are the steps of find() where curves may be joined. Each is done with all curves, or neighbours,
+  /// before the next one begins; teams may do so at once.
+  TANDEM_HD void begin(std::uint32_t curve);
   TANDEM_HD void try_to_join(std::uint32_t curve, int k);
   TANDEM_HD std::uint32_t join();
 
@@ -43,17 +44,20 @@ class RegionFinder {
   /// Area vectors agree if their sum is longer than this part of their lengths' sum.
   static constexpr double kAgree = 0.5;
 
-  // Words of the table: the curve that each is joined to, a piece of each, where each goes, and a byte for
-  // each neighbour that it is joined with: the neighbour's number and 1.
-  TANDEM_HD std::uint32_t& joined_to(std::uint32_t curve) const { return memory_.table[curve]; }
-  TANDEM_HD std::uint32_t& piece_of(std::uint32_t curve) const {
-    return memory_.table[summary_.curves + curve];
+  // The table has, of each curve: the area vector, the curve that it is joined to, a piece, where it goes,
+  // and a byte for each neighbour that it is joined with: the neighbour's number and 1.
+  TANDEM_HD Vector3& area_of(std::uint32_t curve) const {
+    static_assert(sizeof(Vector3) == 24 && PieceMemory::kTableWords % 2 == 0);
+    return reinterpret_cast<Vector3*>(memory_.table)[curve];
   }
-  TANDEM_HD std::uint32_t& place_of(std::uint32_t curve) const {
-    return memory_.table[2 * summary_.curves + curve];
+  TANDEM_HD std::uint32_t& word(std::uint32_t kind, std::uint32_t at) const {
+    return memory_.table[(6 + kind) * summary_.curves + at];
   }
-  TANDEM_HD std::uint32_t& partners_of(std::uint32_t curve, int word) const {
-    return memory_.table[3 * summary_.curves + 2 * curve + static_cast<std::uint32_t>(word)];
+  TANDEM_HD std::uint32_t& joined_to(std::uint32_t curve) const { return word(0, curve); }
+  TANDEM_HD std::uint32_t& piece_of(std::uint32_t curve) const { return word(1, curve); }
+  TANDEM_HD std::uint32_t& place_of(std::uint32_t curve) const { return word(2, curve); }
+  TANDEM_HD std::uint32_t& partners_of(std::uint32_t curve, int half) const {
+    return word(3, 2 * curve + static_cast<std::uint32_t>(half));
   }
   TANDEM_HD std::uint32_t first_of(std::uint32_t curve) const {
     while (joined_to(curve) != curve) curve = joined_to(curve);
@@ -114,12 +118,7 @@ TANDEM_HD bool RegionFinder<Team>::areas_agree(std::uint32_t first) const {
   double sizes = 0;
   for (std::uint32_t c = first; c < summary_.curves; ++c) {
     if (joined_to(c) != first) continue;
-    CurveSums sums;
-    for (std::uint32_t i = memory_.start[c] + team_.rank(); i < memory_.start[c + 1]; i += team_.size())
-      sums.add(memory_, memory_.order[i], summary_.origin, 1 / summary_.unit);
-    add_up(team_, sums.area.x, sums.area.y, sums.area.z);
-    const Vector3 area = sums.area.value(1);
-    sum = sum + area, sizes += norm(area);
+    sum = sum + area_of(c), sizes += norm(area_of(c));
   }
   return norm(sum) > kAgree * sizes;
 }
@@ -152,10 +151,11 @@ TANDEM_HD std::uint32_t RegionFinder<Team>::sort_by_region() {
     if (several && !areas_agree(first) && team_.rank() == 0)
       memory_.pieces[memory_.order[memory_.start[first]]].joined = 1;
   }
-  for (std::uint32_t c = 0; c < curves; ++c) {
-    const std::uint32_t begin = memory_.start[c], place = place_of(c);
-    for (std::uint32_t i = begin + team_.rank(); i < memory_.start[c + 1]; i += team_.size())
-      memory_.curve[place + i - begin] = memory_.order[i];
+  for (std::uint32_t i = team_.rank(); i < summary_.pieces; i += team_.size()) {
+    std::uint32_t c = 0;  // the last curve that begins no later
+    for (std::uint32_t step = 128; step > 0; step /= 2)
+      c += c + step < curves && memory_.start[c + step] <= i ? step : 0;
+    memory_.curve[place_of(c) + i - memory_.start[c]] = memory_.order[i];
   }
   team_.sync();
   for (std::uint32_t i = team_.rank(); i < summary_.pieces; i += team_.size())
@@ -174,14 +174,18 @@ TANDEM_HD std::uint32_t RegionFinder<Team>::sort_by_region() {
 }
 
 template <typename Team>
-TANDEM_HD void RegionFinder<Team>::begin() {
-  for (std::uint32_t c = 0; c < summary_.curves; ++c) {
-    const Place place =
-        CurvePlaces<Team>(team_, memory_)
-            .nearest_place(memory_.start[c], memory_.start[c + 1], summary_.origin, summary_.unit);
-    if (team_.rank() != 0) continue;
-    piece_of(c) = place.piece;
-    partners_of(c, 0) = partners_of(c, 1) = 0;
+TANDEM_HD void RegionFinder<Team>::begin(std::uint32_t curve) {
+  const std::uint32_t first = memory_.start[curve], end = memory_.start[curve + 1];
+  const Place place =
+      CurvePlaces<Team>(team_, memory_).nearest_place(first, end, summary_.origin, summary_.unit);
+  CurveSums sums;
+  for (std::uint32_t i = first + team_.rank(); i < end; i += team_.size())
+    sums.add(memory_, memory_.order[i], summary_.origin, 1 / summary_.unit);
+  add_up(team_, sums.area.x, sums.area.y, sums.area.z);
+  if (team_.rank() == 0) {
+    piece_of(curve) = place.piece;
+    partners_of(curve, 0) = partners_of(curve, 1) = 0;
+    area_of(curve) = sums.area.value(1);
   }
   team_.sync();
 }
@@ -263,7 +267,7 @@ TANDEM_HD std::uint32_t RegionFinder<Team>::join() {
 template <typename Team>
 TANDEM_HD std::uint32_t RegionFinder<Team>::find() {
   if (!may_join(summary_)) return summary_.curves;
-  begin();
+  for (std::uint32_t c = 0; c < summary_.curves; ++c) begin(c);
   for (std::uint32_t c = 0; c < summary_.curves; ++c) {
     for (int k = 0; k < kNeighbours; ++k) try_to_join(c, k);
   }

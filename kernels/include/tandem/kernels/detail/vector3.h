@@ -3,12 +3,14 @@
 
 #include "tandem/formats/platform.h"
 
-/// A function that a GPU calls instead of copying it to where it is called from: code that warps share stays
-/// in their cache, and what is seldom done takes no registers.
+/// A function that a GPU calls instead of copying it to where it is called from, and a loop whose body it has
+/// once: code that warps share stays in their cache, and what is seldom done takes no registers.
 #if defined(__CUDACC__)
 #define TANDEM_HD_CALLED __host__ __device__ __noinline__
+#define TANDEM_ROLLED _Pragma("unroll 1")
 #else
 #define TANDEM_HD_CALLED
+#define TANDEM_ROLLED
 #endif
 
 /// Vectors of float64 for contact manifolds. Every operation is rounded by itself: host code is compiled with

@@ -323,42 +323,63 @@ __device__ manifold::DeepLines& deep_lines(BegunPatch& begun) {
   return *reinterpret_cast<manifold::DeepLines*>(&begun.state);
 }
 
+__device__ std::uint32_t patches_begun(const ManifoldArgs& args) {
+  const std::uint32_t wanted = patches_wanted(*args.state);
+  return wanted < args.capacity.manifolds ? wanted : args.capacity.manifolds;
+}
+
+/// Calls of(team, place, curve, warp) for the place of each patch: those of curves of many pieces come first,
+/// and are a block's.
+template <typename Of>
+__device__ void for_each_patch(const ManifoldArgs& args, std::uint32_t& next_many, std::uint32_t& next_few,
+                               const Of& of) {
+  const ManifoldState& state = *args.state;
+  const auto of_row = [&](const auto& team, std::uint32_t row, std::uint32_t own) {
+    constexpr bool kMany = kIsLarge<std::remove_cvref_t<decltype(team)>>;
+    const std::uint32_t place = kMany ? row : state.curves_of_many + row;
+    if (place < args.capacity.manifolds)
+      of(team, place, args.curves[kMany ? row : args.capacity.contacts - 1 - row], own);
+  };
+  share_out<kThreads>(state.curves_of_many, next_many, state.curves_of_few, next_few, of_row);
+}
+
 /// Begins the patch of each curve.
 __global__ void __launch_bounds__(kThreads, 4) begin_patches(const __grid_constant__ ManifoldArgs args) {
   __shared__ MakerMemory memory[kWarps];
   __shared__ Raw<manifold::OutlineMemory> outline[kWarps];
-  __shared__ std::uint32_t places[kWarps];
   wait_for_kernel_before();
   if (!has_query(args)) return;
   ManifoldState& state = *args.state;
-  const auto of = [&](const auto& team, std::uint32_t row, std::uint32_t own) {
-    constexpr bool kMany = kIsLarge<std::remove_cvref_t<decltype(team)>>;
-    const PairCurve curve = args.curves[kMany ? row : args.capacity.contacts - 1 - row];
-    std::uint32_t& place = places[own];
-    if (team.rank() == 0) {
-      place = atomicAdd(&state.next_patch, 1u);
-      if (place >= args.capacity.manifolds)
-        atomicAdd(&state.needed_points, static_cast<Counter>(args.most_points));
-    }
-    team.sync();
-    if (place >= args.capacity.manifolds) return;
-    with_maker(args, team, memory[own], curve, [&](auto& maker, const PatchState& made) {
-      maker.begin(curve.curve, outline[own].get(), depth_search(args, place));
-      const bool is_deep = made.kind == manifold::PatchKind::deep;
-      if (team.rank() == 0) {
-        args.begun[place].of = curve, args.begun[place].is_deep = is_deep;
-        if (is_deep) args.next_of_pair[atomicAdd(&state.deep_patches, 1u)] = place;
-      }
-      copy_state(team, made, args.begun[place].state);
-    });
-  };
-  share_out<kThreads>(state.curves_of_many, state.next_curve_of_many, state.curves_of_few,
-                      state.next_curve_of_few, of);
+  if (blockIdx.x == 0 && threadIdx.x == 0 && patches_wanted(state) > patches_begun(args))
+    state.needed_points = Counter{patches_wanted(state) - patches_begun(args)} * args.most_points;
+  for_each_patch(args, state.next_curve_of_many, state.next_curve_of_few,
+                 [&](const auto& team, std::uint32_t place, const PairCurve& curve, std::uint32_t own) {
+                   with_maker(args, team, memory[own], curve, [&](auto& maker, const PatchState& made) {
+                     maker.begin(curve.curve, outline[own].get(), depth_search(args, place));
+                     const bool is_deep = made.kind == manifold::PatchKind::deep;
+                     if (team.rank() == 0) {
+                       args.begun[place].of = curve, args.begun[place].is_deep = is_deep;
+                       if (is_deep) args.next_of_pair[atomicAdd(&state.deep_patches, 1u)] = place;
+                     }
+                     copy_state(team, made, args.begun[place].state);
+                   });
+                 });
 }
 
-__device__ std::uint32_t patches_begun(const ManifoldArgs& args) {
-  const std::uint32_t wanted = args.state->next_patch;
-  return wanted < args.capacity.manifolds ? wanted : args.capacity.manifolds;
+/// Finds the rim of each patch that has a normal, and places from which to look for its depth.
+__global__ void __launch_bounds__(kThreads, 4) outline_patches(const __grid_constant__ ManifoldArgs args) {
+  __shared__ MakerMemory memory[kWarps];
+  __shared__ Raw<manifold::OutlineMemory> outline[kWarps];
+  wait_for_kernel_before();
+  if (!has_query(args)) return;
+  for_each_patch(args, args.state->next_outline_of_many, args.state->next_outline_of_few,
+                 [&](const auto& team, std::uint32_t place, const PairCurve& curve, std::uint32_t own) {
+                   with_maker(args, team, memory[own], curve, [&](auto& maker, PatchState& state) {
+                     copy_state(team, args.begun[place].state, state);
+                     maker.outline(curve.curve, outline[own].get(), depth_search(args, place));
+                     copy_state(team, state, args.begun[place].state);
+                   });
+                 });
 }
 
 /// Sounds the rim of each patch, and finds points of the overlap, by a warp.
@@ -526,10 +547,11 @@ __global__ void __launch_bounds__(kThreads) remember(const __grid_constant__ Man
   if (threadIdx.x != 0) return;
   __threadfence();
   if (atomicAdd(&state.finished_blocks, 1u) + 1 != gridDim.x) return;
-  state.next_many = state.next_few = state.next_patch = state.tiles_taken = 0;
+  state.next_many = state.next_few = state.tiles_taken = 0;
   state.curves_of_many = state.curves_of_few = state.next_curve_of_many = state.next_curve_of_few = 0;
   state.several_curves = state.next_to_join = state.next_neighbour = state.next_joined = 0;
   state.deep_patches = state.next_ended = 0;
+  state.next_outline_of_many = state.next_outline_of_few = 0;
   state.next_sounded = state.next_measured = state.next_finished = 0;
   state.needed_points = state.segments = state.ambiguous_touches = state.open_curves = 0;
   state.too_many_contacts = state.finished_blocks = 0;
@@ -568,6 +590,7 @@ cudaError_t make_patches(const ManifoldArgs& args, cudaStream_t stream) {
   if (error == cudaSuccess) error = launch_after(grid(4, kThreads, 0), try_to_join, args);
   if (error == cudaSuccess) error = launch_after(grid(4, kThreads, 0), join_regions, args);
   if (error == cudaSuccess) error = launch_after(grid(4, kThreads, 0), begin_patches, args);
+  if (error == cudaSuccess) error = launch_after(grid(4, kThreads, 0), outline_patches, args);
   if (error == cudaSuccess) error = launch_after(grid(4, kThreads, 0), sound_patches, args);
   if (error == cudaSuccess) error = launch_after(grid(4, kThreads, 0), measure_depths, args);
   if (error == cudaSuccess) error = launch_after(grid(3, kThreads, 0), end_deep_patches, args);

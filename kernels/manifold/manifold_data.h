@@ -63,10 +63,11 @@ struct alignas(8) TableEntry {
 
 struct ManifoldState {
   // Cleared by each call.
-  std::uint32_t next_many, next_few, next_patch, tiles_taken;
+  std::uint32_t next_many, next_few, tiles_taken;
   std::uint32_t curves_of_many, curves_of_few, next_curve_of_many, next_curve_of_few;
-  std::uint32_t several_curves, next_to_join, next_neighbour, next_joined, deep_patches, next_sounded,
-      next_measured, next_ended, next_finished;
+  std::uint32_t several_curves, next_to_join, next_neighbour, next_joined, deep_patches;
+  std::uint32_t next_outline_of_many, next_outline_of_few, next_sounded, next_measured, next_ended,
+      next_finished;
   Counter needed_points, segments, ambiguous_touches, open_curves;
   std::uint32_t too_many_contacts, finished_blocks;
 
@@ -152,6 +153,11 @@ __device__ inline bool keeps(const ManifoldArgs& args) {
   return args.moved.call != nullptr && has_pairs(args) && knows_kept(args) && args.moved.call->kept != 0;
 }
 
+/// Returns how many patches there are, with or without room.
+__device__ inline std::uint32_t patches_wanted(const ManifoldState& state) {
+  return state.curves_of_many + state.curves_of_few;
+}
+
 /// Returns whether all had room: the same for all threads of all kernels behind make_patches().
 __device__ inline bool is_complete(const ManifoldArgs& args) {
   const ManifoldState& state = *args.state;
@@ -159,7 +165,7 @@ __device__ inline bool is_complete(const ManifoldArgs& args) {
   return args.query->status == Status::kOk && args.query->complete != 0 &&
          args.query->contacts <= args.capacity.contacts && has_pairs(args) && knows_kept(args) &&
          state.too_many_contacts == 0 &&
-         state.next_patch + (keeps ? state.kept_manifolds : 0) <= args.capacity.manifolds &&
+         patches_wanted(state) + (keeps ? state.kept_manifolds : 0) <= args.capacity.manifolds &&
          state.needed_points + (keeps ? state.kept_points : 0) <= args.capacity.points;
 }
 

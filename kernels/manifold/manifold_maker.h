@@ -34,9 +34,12 @@ class ManifoldMaker {
                           const PieceSummary& summary, PatchState& state)
       : team_(team), bodies_(bodies), memory_(memory), summary_(summary), state_(state) {}
 
-  /// Finds normal and rim, or the directions in which a patch of kind `deep` is to be measured, and places
-  /// beside which points of the overlap are looked for.
+  /// Finds the normal, or the directions in which a patch of kind `deep` is to be measured.
   TANDEM_HD void begin(std::uint32_t region, OutlineMemory& shared, DepthSearch& search);
+
+  /// Finds the rim of a patch that has a normal, and places beside which points of the overlap are looked
+  /// for.
+  TANDEM_HD void outline(std::uint32_t region, OutlineMemory& shared, DepthSearch& search);
 
   /// Finds the surfaces beside the points of the rim, and points of the overlap from which to look for the
   /// deepest line. Condition, here and below: the patch is an overlap, or deep.
@@ -69,8 +72,8 @@ class ManifoldMaker {
                         const NewPatch& new_patch);
 
  private:
-  TANDEM_HD void find_rim(std::uint32_t region, const CurveMeasure& measure, const PatchNormal& normal,
-                          OutlineMemory& shared);
+  TANDEM_HD void take_normal(const CurveMeasure& measure, const PatchNormal& normal);
+  TANDEM_HD void find_rim(std::uint32_t region, const CurveMeasure& measure, OutlineMemory& shared);
   TANDEM_HD void place_soundings(const RimFinder<Team>& finder, const Rim& rim);
   TANDEM_HD std::uint32_t ask_at_rim(LineMemory& lines) const;
   TANDEM_HD void take_rim(const LineMemory& lines);
@@ -131,8 +134,7 @@ TANDEM_HD void ManifoldMaker<Team>::place_soundings(const RimFinder<Team>& finde
 }
 
 template <typename Team>
-TANDEM_HD void ManifoldMaker<Team>::find_rim(std::uint32_t region, const CurveMeasure& measure,
-                                             const PatchNormal& normal, OutlineMemory& shared) {
+TANDEM_HD void ManifoldMaker<Team>::take_normal(const CurveMeasure& measure, const PatchNormal& normal) {
   const bool touch = normal.kind == PatchKind::touch;
   if (team_.rank() == 0) {
     state_.kind = normal.kind;
@@ -144,14 +146,19 @@ TANDEM_HD void ManifoldMaker<Team>::find_rim(std::uint32_t region, const CurveMe
     state_.area = measure.area;
     state_.centre = measure.middle;
     state_.key = measure.key;
-    if (normal.kind == PatchKind::touch || normal.kind == PatchKind::overlap)
-      state_.frame = PatchFrame(summary_.origin, normal.n);
+    if (touch || normal.kind == PatchKind::overlap) state_.frame = PatchFrame(summary_.origin, normal.n);
   }
   team_.sync();
-  if (normal.kind == PatchKind::ambiguous || normal.kind == PatchKind::deep) return;
+}
+
+/// Finds the rim of a patch that has a normal; without one it is ambiguous.
+template <typename Team>
+TANDEM_HD void ManifoldMaker<Team>::find_rim(std::uint32_t region, const CurveMeasure& measure,
+                                             OutlineMemory& shared) {
+  const int most = state_.kind == PatchKind::touch ? kMostRimPoints : kMostRimPoints - 1;
   RimFinder<Team> rim_finder(team_, bodies_, memory_, summary_, region, state_.frame);
   rim_finder.gather(measure.closed && !summary_.degenerate, shared.next);
-  rim_finder.find(touch ? kMostRimPoints : kMostRimPoints - 1, state_.frame.flat(measure.middle), shared.rim);
+  rim_finder.find(most, state_.frame.flat(measure.middle), shared.rim);
   if (shared.rim.rim.points > 0) return place_soundings(rim_finder, shared.rim.rim);
   team_.sync();
   if (team_.rank() == 0) state_.kind = PatchKind::ambiguous;
@@ -162,24 +169,33 @@ template <typename Team>
 TANDEM_HD void ManifoldMaker<Team>::begin(std::uint32_t region, OutlineMemory& shared, DepthSearch& search) {
   team_.sync();  // all are done with what the last region left
   NormalFinder<Team> normal_finder(team_, bodies_, memory_, summary_, region, shared.normal);
-  const CurveMeasure measure = normal_finder.measure();
-  if (team_.rank() == 0) shared.measure = measure;
-  find_rim(region, measure, normal_finder.find(measure), shared);
+  {
+    const CurveMeasure measure = normal_finder.measure();
+    if (team_.rank() == 0) search.measure = measure;
+    take_normal(measure, normal_finder.find(measure));
+  }
   const bool is_deep = state_.kind == PatchKind::deep;
-  const int lines = is_deep ? normal_finder.gather_for_deep(shared.measure) : 1;
-  const double reach = is_deep ? normal_finder.reach_from(shared.measure.middle) : state_.reach;
+  const int lines = is_deep ? normal_finder.gather_for_deep(search.measure) : 1;
+  const double reach = is_deep ? normal_finder.reach_from(search.measure.middle) : 0;
   if (team_.rank() == 0) {
-    search.middle = is_deep ? shared.measure.middle : state_.centre;
-    search.reach = reach;
+    search.middle = search.measure.middle, search.reach = reach;
     search.both_ways = is_deep && shared.normal.both_ways;
     search.directions = search.both_ways ? 2 * lines : lines;
     search.enough = INFINITY;
     if (state_.kind == PatchKind::overlap) search.tried[0] = state_.frame.n;
-    if (is_deep) {
-      search.measure = shared.measure;
-      for (int i = 0; i < lines; ++i) search.tried[i] = shared.normal.tried[i];
-    }
+    for (int i = 0; i < lines && is_deep; ++i) search.tried[i] = shared.normal.tried[i];
   }
+  team_.sync();
+}
+
+template <typename Team>
+TANDEM_HD void ManifoldMaker<Team>::outline(std::uint32_t region, OutlineMemory& shared,
+                                            DepthSearch& search) {
+  const bool is_deep = state_.kind == PatchKind::deep;
+  if (state_.kind == PatchKind::touch || state_.kind == PatchKind::overlap)
+    find_rim(region, search.measure, shared);
+  if (team_.rank() == 0 && state_.kind == PatchKind::overlap)
+    search.middle = state_.centre, search.reach = state_.reach;
   team_.sync();
   if (state_.kind != PatchKind::overlap && !is_deep) return;
   const int wanted = is_deep || state_.candidates > kFewCandidates ? kMostSeeds : kMostSeeds / 2;
@@ -228,7 +244,9 @@ TANDEM_HD_CALLED void ManifoldMaker<Team>::end_deep(std::uint32_t region, const 
     normal.n = search.along(i), normal.kind = PatchKind::overlap;
     deepest = found.along[i];
   }
-  find_rim(region, search.measure, normal, shared);
+  take_normal(search.measure, normal);
+  if (state_.kind != PatchKind::overlap) return;
+  find_rim(region, search.measure, shared);
   if (state_.kind != PatchKind::overlap) return;
   const std::uint32_t asked = ask_at_rim(lines);
   LineQuestions questions(bodies_, lines.line);
@@ -246,6 +264,7 @@ TANDEM_HD_CALLED void ManifoldMaker<Team>::end_deep(std::uint32_t region, const 
 template <typename Team>
 TANDEM_HD void ManifoldMaker<Team>::measure(std::uint32_t region, DepthSearch& search, OutlineMemory& shared,
                                             SearchMemory& depths) {
+  outline(region, shared, search);
   if (state_.kind != PatchKind::overlap && state_.kind != PatchKind::deep) return;
   sound(region, search, depths);
   if (state_.kind == PatchKind::overlap)

@@ -209,7 +209,7 @@ struct PatchState {
 
 /// Where the overlap of a patch is to be measured: along its normal, or along many directions if it is deep.
 struct DepthSearch {
-  CurveMeasure measure;  ///< of a deep patch
+  CurveMeasure measure;
   Vector3 middle;
   double reach;  ///< from the middle to the rim; of a deep patch, to all pieces
   int directions, places;
@@ -236,7 +236,6 @@ struct DeepLines {
 
 /// The memory that a team shares while it finds a patch's normal and rim.
 struct OutlineMemory {
-  CurveMeasure measure;
   NormalMemory normal;
   RimMemory rim;
   std::uint32_t next;

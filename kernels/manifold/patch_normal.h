@@ -408,8 +408,13 @@ TANDEM_HD void NormalFinder<Team>::spread_along(int count) const {
 template <typename Team>
 TANDEM_HD Vector3 NormalFinder<Team>::face_nearest(const Vector3& smooth, double length) {
   directions_ = 0;
-  const int of_a = gather_directions(0, false) ? directions_ : kMost, first_of_b = directions_;
-  const int of_b = gather_directions(1, false) ? directions_ - first_of_b : kMost;
+  int of_a = 0, of_b = 0, first_of_b = 0;
+  TANDEM_ROLLED
+  for (int side = 0; side < 2; ++side) {
+    first_of_b = directions_;
+    const bool all = gather_directions(side, false);
+    (side == 0 ? of_a : of_b) = all ? directions_ - first_of_b : kMost;
+  }
   if ((of_a == 1) != (of_b == 1)) {
     const Vector3 n = shared_.direction[of_a == 1 ? 0 : first_of_b].n;
     bool flush = false;

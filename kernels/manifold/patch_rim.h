@@ -169,28 +169,26 @@ TANDEM_HD void RimFinder<Team>::find(int most, const Vector2& middle, RimMemory&
     rim.reference[where] = reference, rim.rank[where] = rank;
     rim.at[where] = {static_cast<float>(at.x), static_cast<float>(at.y)};
   };
-  const auto insert_furthest = [&](const FloatPoint& from, float than) {
-    const RimValue value[] = {{from, from, true}};
-    Furthest best[] = {{than, kNoIndex}};
-    furthest(value, best);
-    const bool found = best[0].reference != kNoIndex;
-    team_.sync();  // all have read what is shared
-    if (is_first && found) insert(rim.points, best[0].reference), limit = kThin * best[0].value;
-    team_.sync();
-    return found;
-  };
-  if (!insert_furthest({static_cast<float>(middle.x), static_cast<float>(middle.y)}, -1)) return;
-  if (most == 1 || !insert_furthest(rim.at[0], 0)) return;
   while (rim.points < most && !shared.complete) {
+    // First the candidate furthest from the middle, then that furthest from it; later on, what lies beyond
+    // the sides that are new.
+    const bool begins = rim.points < 2;
     const int first = shared.first, second = shared.second;
-    const auto beyond = [&](int i) {
-      return RimValue{rim.at[i], rim.at[i + 1 == rim.points ? 0 : i + 1], false};
+    const FloatPoint from =
+        rim.points > 0 ? rim.at[0] : FloatPoint{static_cast<float>(middle.x), static_cast<float>(middle.y)};
+    const auto value = [&](int i) {
+      return begins ? RimValue{from, from, true}
+                    : RimValue{rim.at[i], rim.at[i + 1 == rim.points ? 0 : i + 1], false};
     };
-    const RimValue values[] = {beyond(first), beyond(second)};
-    Furthest found[2] = {{0, kNoIndex}, {0, kNoIndex}};
+    const RimValue values[] = {value(first), value(second)};
+    const float than = rim.points == 0 ? -1.0f : 0.0f;
+    Furthest found[2] = {{than, kNoIndex}, {than, kNoIndex}};
     furthest(values, found);
     team_.sync();  // all have read what is shared
-    if (is_first) {
+    if (is_first && begins) {
+      shared.complete = found[0].reference == kNoIndex;
+      if (!shared.complete) insert(rim.points, found[0].reference), limit = kThin * found[0].value;
+    } else if (is_first) {
       shared.of_side[first] = found[0], shared.of_side[second] = found[1];
       int side = 0;
       for (int i = 1; i < rim.points; ++i)

@@ -59,7 +59,8 @@ __device__ void write_report(const ManifoldArgs& args, std::uint32_t manifolds, 
   report.complete = complete ? 1 : 0;
   report.needed.pairs = keeps ? *args.moved.pairs.count : *args.pairs.count;
   report.needed.contacts = args.query->complete != 0 ? args.query->contacts : args.query->needed.contacts;
-  report.needed.manifolds = static_cast<std::uint32_t>(state.next_patch + (keeps ? state.kept_manifolds : 0));
+  report.needed.manifolds =
+      static_cast<std::uint32_t>(patches_wanted(state) + (keeps ? state.kept_manifolds : 0));
   report.needed.points =
       needed_points < 0x7FFFFFFFull ? static_cast<std::uint32_t>(needed_points) : 0x7FFFFFFFu;
   if (complete) {

@@ -404,7 +404,7 @@ __global__ void __launch_bounds__(kThreads, 4) sound_patches(const __grid_consta
 }
 
 /// Finds the deepest line of each patch, along each direction if it is deep, by a warp.
-__global__ void __launch_bounds__(kThreads, 4) measure_depths(const __grid_constant__ ManifoldArgs args) {
+__global__ void __launch_bounds__(kThreads, 3) measure_depths(const __grid_constant__ ManifoldArgs args) {
   __shared__ WarpWalks walks[kWarps];
   __shared__ MakerMemory memory[kWarps];
   __shared__ Raw<manifold::SearchMemory> searches[kWarps];
@@ -592,7 +592,7 @@ cudaError_t make_patches(const ManifoldArgs& args, cudaStream_t stream) {
   if (error == cudaSuccess) error = launch_after(grid(4, kThreads, 0), begin_patches, args);
   if (error == cudaSuccess) error = launch_after(grid(4, kThreads, 0), outline_patches, args);
   if (error == cudaSuccess) error = launch_after(grid(4, kThreads, 0), sound_patches, args);
-  if (error == cudaSuccess) error = launch_after(grid(4, kThreads, 0), measure_depths, args);
+  if (error == cudaSuccess) error = launch_after(grid(3, kThreads, 0), measure_depths, args);
   if (error == cudaSuccess) error = launch_after(grid(3, kThreads, 0), end_deep_patches, args);
   return error == cudaSuccess ? launch_after(grid(6, kThreads, 0), finish_patches, args) : error;
 }

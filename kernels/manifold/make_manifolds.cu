@@ -207,18 +207,18 @@ __global__ void __launch_bounds__(kFinders, 2) find_curves(const __grid_constant
   share_out<kFinders>(groups.counts->many, state.next_many, groups.counts->few, state.next_few, of);
 }
 
-/// Finds what is known of each curve before it is joined with others, by a warp.
+/// Finds what is known of each curve before it is joined with others, by a block.
 __global__ void __launch_bounds__(kThreads, 6) begin_to_join(const __grid_constant__ ManifoldArgs args) {
-  __shared__ Raw<BodyPair> shared_bodies[kWarps];
-  __shared__ std::uint32_t taken[kWarps];
+  __shared__ BlockScratch<kThreads> scratch;
+  __shared__ Raw<BodyPair> bodies;
+  __shared__ std::uint32_t taken;
   wait_for_kernel_before();
   if (!has_query(args)) return;
-  const std::uint32_t own = threadIdx.x / 32;
-  const WarpTeam team(nullptr);
-  take_rows(team, args.state->several_curves, args.state->next_to_join, taken[own], [&](std::uint32_t row) {
+  const LargeTeam team(&scratch, nullptr);
+  take_rows(team, args.state->several_curves, args.state->next_to_join, taken, [&](std::uint32_t row) {
     const PairCurve curve = args.curves[row];
-    manifold::RegionFinder<WarpTeam>(team, shared_bodies[own].get(), memory_of(args, curve.pair),
-                                     args.summaries[curve.pair], nullptr)
+    manifold::RegionFinder<LargeTeam>(team, bodies.get(), memory_of(args, curve.pair),
+                                      args.summaries[curve.pair], nullptr)
         .begin(curve.curve);
   });
 }

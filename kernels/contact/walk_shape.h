@@ -50,6 +50,9 @@ TANDEM_HD constexpr std::uint32_t block_pairs_to_take(std::uint32_t waiting, std
   return room > reserve ? room - reserve : 1;
 }
 
+/// A step may take the oldest block pairs where so many entries are free beyond the reserve.
+inline constexpr std::uint32_t kRoomForOldest = 112;
+
 struct WalkShape {
   std::uint32_t warps;         ///< of a thread block
   std::uint32_t blocks;        ///< thread blocks

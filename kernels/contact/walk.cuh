@@ -130,7 +130,7 @@ class Walk {
   __device__ void step() {
     if constexpr (kShares) warp_.begin_look();  // comes while the boxes are tested
     const Taken taken = stack_.take_block_pairs(
-        block_pairs_to_take(stack_.waiting(), stack_.room(), args_.shape.reserve), kShares && takes_oldest());
+        block_pairs_to_take(stack_.waiting(), stack_.room(), args_.shape.reserve), takes_oldest());
     const bool mine = taken.mine && is_open(taken.entry.x);
     Tested tested = {{taken.entry.x, 0, 0, 0}, false};
     if (mine) tested = test(taken);
@@ -146,10 +146,11 @@ class Walk {
     if (++rounds_ >= kRoundsBetweenCounts) add_counters(), rounds_ = 0;
   }
 
-  /// Returns whether the next step takes the oldest block pairs, all of which have most below them, and not
-  /// the newest.
+  /// Returns whether the next step takes the oldest block pairs. A walk that looks for first contacts reaches
+  /// triangles sooner from the newest.
   __device__ bool takes_oldest() const {
-    return !more_input_ && !args_.first_contact_only && stack_.room() >= args_.shape.reserve + kRoomForOldest;
+    return kShares && !more_input_ && !args_.first_contact_only &&
+           has_room_for_oldest(stack_.room(), args_.shape.reserve);
   }
 
   /// Returns false where the first contact is enough and the pair has one. One lane calls it.

@@ -63,6 +63,7 @@ class Walk {
       const std::uint32_t least = all_done ? 1 : kFull;
       while (stack_.candidates() >= least) settle(min(stack_.candidates(), kFull));
       if (all_done) break;
+      stack_.make_room(args_.shape.reserve + kRoomForOldest);
       if (stack_.waiting() < kFull && more_input_) take_pairs();
       if (stack_.waiting() != 0)
         step();
@@ -128,8 +129,8 @@ class Walk {
   /// Takes up to 32 block pairs off, tests them and puts on those that hit.
   __device__ void step() {
     if constexpr (kShares) warp_.begin_look();  // comes while the boxes are tested
-    const Taken taken =
-        stack_.take_block_pairs(block_pairs_to_take(stack_.waiting(), stack_.room(), args_.shape.reserve));
+    const Taken taken = stack_.take_block_pairs(
+        block_pairs_to_take(stack_.waiting(), stack_.room(), args_.shape.reserve), takes_oldest());
     const bool mine = taken.mine && is_open(taken.entry.x);
     Tested tested = {{taken.entry.x, 0, 0, 0}, false};
     if (mine) tested = test(taken);
@@ -143,6 +144,13 @@ class Walk {
       if (stack_.waiting() >= kFewestToShare) share();
     }
     if (++rounds_ >= kRoundsBetweenCounts) add_counters(), rounds_ = 0;
+  }
+
+  /// Returns whether the next step takes the oldest block pairs. A walk that looks for first contacts reaches
+  /// triangles sooner from the newest.
+  __device__ bool takes_oldest() const {
+    return kShares && !more_input_ && !args_.first_contact_only &&
+           has_room_for_oldest(stack_.room(), args_.shape.reserve);
   }
 
   /// Returns false where the first contact is enough and the pair has one. One lane calls it.

@@ -50,6 +50,15 @@ TANDEM_HD constexpr std::uint32_t block_pairs_to_take(std::uint32_t waiting, std
   return room > reserve ? room - reserve : 1;
 }
 
+/// Room beyond the reserve that lets a step take the oldest block pairs instead of the newest. Theirs are the
+/// longest ways that are left, so a walk that takes them first ends sooner; but more entries come on before
+/// the first of them is done. With less room steps take the newest, so the proof above holds.
+inline constexpr std::uint32_t kRoomForOldest = 112;
+
+TANDEM_HD constexpr bool has_room_for_oldest(std::uint32_t room, std::uint32_t reserve) {
+  return room >= reserve + kRoomForOldest;
+}
+
 struct WalkShape {
   std::uint32_t warps;         ///< of a thread block
   std::uint32_t blocks;        ///< thread blocks

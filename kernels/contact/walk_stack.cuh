@@ -89,13 +89,27 @@ class WalkStack {
   __device__ std::uint32_t height() const { return height_; }          ///< entries of the stack
   __device__ std::uint32_t waiting() const { return waiting_; }        ///< its bits: block pairs
   __device__ std::uint32_t candidates() const { return candidates_; }  ///< bits of pairs of leaf blocks
-  __device__ std::uint32_t room() const { return size_ - height_ - leaf_pairs_; }  ///< entries
+  __device__ std::uint32_t room() const { return size_ - base_ - height_ - leaf_pairs_; }  ///< entries
+
+  /// Moves the stack to the start of its memory if there is less room than wanted behind it, and some before.
+  __device__ void make_room(std::uint32_t wanted) {
+    if (base_ == 0 || room() >= wanted) return;
+    for (std::uint32_t first = 0; first < height_; first += kFull) {
+      const bool mine = first + lane_ < height_;
+      uint4 entry = {0, 0, 0, 0};
+      if (mine) entry = load_shared4(at(base_ + first + lane_));
+      __syncwarp();  // what is overwritten from now on, all lanes have read
+      if (mine) store_shared4(at(first + lane_), entry);
+    }
+    base_ = 0;
+    __syncwarp();
+  }
 
   /// Puts on the roots of an object pair for each lane that has one. roots: the family of a tree's root.
   __device__ void put_roots(bool mine, std::uint32_t pair, std::uint32_t roots, bool self) {
     const std::uint32_t lanes = __ballot_sync(kAllLanes, mine);
     if (mine)
-      store_shared4(at(height_ + __popc(lanes & lanes_below())),
+      store_shared4(at(base_ + height_ + __popc(lanes & lanes_below())),
                     {pair, roots, roots | (self ? kSelf : 0), 1});
     height_ += __popc(lanes);
     waiting_ += __popc(lanes);
@@ -109,7 +123,7 @@ class WalkStack {
     const std::uint32_t leaf_lanes = __ballot_sync(kAllLanes, bits != 0 && of_leaves);
     const std::uint32_t all = __reduce_add_sync(kAllLanes, of_leaves ? bits << 16 : bits);
     const std::uint32_t before = __popc((of_leaves ? leaf_lanes : lanes) & lanes_below());
-    const std::uint32_t place = of_leaves ? size_ - 1 - leaf_pairs_ - before : height_ + before;
+    const std::uint32_t place = of_leaves ? size_ - 1 - leaf_pairs_ - before : base_ + height_ + before;
     if (bits != 0) store_shared4(at(place), entry);
     height_ += __popc(lanes);
     leaf_pairs_ += __popc(leaf_lanes);
@@ -118,33 +132,38 @@ class WalkStack {
     __syncwarp();
   }
 
-  /// Takes the newest block pairs off, one a lane. Condition: count <= 32, count <= waiting(); put() follows.
-  __device__ Taken take_block_pairs(std::uint32_t count) {
+  /// Takes the oldest or the newest block pairs off, one a lane. Condition: count <= 32, count <= waiting();
+  /// put() follows.
+  __device__ Taken take_block_pairs(std::uint32_t count, bool oldest) {
     waiting_ -= count;
-    return take<-1>(count, at(height_ - 1), height_);
+    const std::uint32_t before = height_;
+    const Taken taken =
+        take(count, at(oldest ? base_ : base_ + height_ - 1), oldest ? kBytes : 0 - kBytes, height_);
+    if (oldest) base_ += before - height_;
+    return taken;
   }
 
   /// Takes the newest candidates off, one a lane. Condition: count <= 32, count <= candidates().
   __device__ Taken take_candidates(std::uint32_t count) {
     candidates_ -= count;
-    const Taken taken = take<1>(count, at(size_ - leaf_pairs_), leaf_pairs_);
+    const Taken taken = take(count, at(size_ - leaf_pairs_), kBytes, leaf_pairs_);
     __syncwarp();  // other lanes may read next what the last of these stored
     return taken;
   }
 
   /// Takes the oldest entries off, which have the most below them: give(take_off) calls take_off(lane, words)
-  /// once in each lane below `count`, for an entry that is given away. Condition: 2 count <= height().
+  /// once in each lane below `count`, for an entry that is given away. Condition: count <= height().
   template <class Give>
   __device__ void take_oldest(std::uint32_t count, Give give) {
-    height_ -= count;
     std::uint32_t bits = 0;
     give([&](std::uint32_t lane, std::uint64_t(&words)[2]) {
-      const uint4 entry = load_shared4(at(lane));
+      const uint4 entry = load_shared4(at(base_ + lane));
       bits = __popc(entry.w & 0xFFFFu);
       words[0] = std::uint64_t{entry.y | kGiven} << 32 | entry.x;
       words[1] = std::uint64_t{entry.w} << 32 | entry.z;
-      store_shared4(at(lane), load_shared4(at(height_ + lane)));  // the newest fill the gap
     });
+    base_ += count;
+    height_ -= count;
     waiting_ -= __reduce_add_sync(kAllLanes, bits);
     __syncwarp();
   }
@@ -154,6 +173,7 @@ class WalkStack {
   template <class Receive>
   __device__ std::uint32_t put_given(Receive receive) {
     std::uint32_t bits = 0;
+    base_ = 0;
     height_ = receive([&](std::uint32_t lane, const std::uint64_t(&words)[2]) {
       const auto w = static_cast<std::uint32_t>(words[1] >> 32);
       store_shared4(at(lane), {static_cast<std::uint32_t>(words[0]),
@@ -167,21 +187,22 @@ class WalkStack {
   }
 
  private:
-  __device__ std::uint32_t lanes_below() const { return (1u << lane_) - 1; }
-  __device__ std::uint32_t at(std::uint32_t entry) const { return memory_ + 16 * entry; }  ///< address
+  static constexpr std::uint32_t kBytes = 4 * kEntryWords;  // of an entry
 
-  /// Takes `count` bits of the newest entries off, one a lane, neighbours from one entry. newest: address of
-  /// the newest entry; kOlder: the way to the one before it. entries: how many there are, before and after.
-  /// Condition: they have so many bits.
+  __device__ std::uint32_t lanes_below() const { return (1u << lane_) - 1; }
+  __device__ std::uint32_t at(std::uint32_t entry) const { return memory_ + kBytes * entry; }  ///< address
+
+  /// Takes `count` bits off, one a lane, neighbours from one entry. first: address of the entry that is taken
+  /// from first; step: the way to the next. entries: how many there are, before and after. Condition: they
+  /// have so many bits.
   ///
-  /// Lane l looks at the l-th newest entry. Each has at least one bit, at most 16, so four ballots tell how
-  /// many bits those before it have. Numbered through, the first bits of the entries are starts: the entry
-  /// that lane l takes from is the one of the last start up to l.
-  template <int kOlder>
-  __device__ Taken take(std::uint32_t count, std::uint32_t newest, std::uint32_t& entries) {
-    constexpr auto kStep = static_cast<std::uint32_t>(kOlder * 16);
+  /// Lane l looks at the l-th of these entries. Each has at least one bit, at most 16, so four ballots tell
+  /// how many bits those before it have. Numbered through, the first bits of the entries are starts: the
+  /// entry that lane l takes from is the one of the last start up to l.
+  __device__ Taken take(std::uint32_t count, std::uint32_t first, std::uint32_t step,
+                        std::uint32_t& entries) {
     const bool there = lane_ < entries;
-    const std::uint32_t bits = there ? load_shared(newest + kStep * lane_ + 12) & 0xFFFFu : 1;
+    const std::uint32_t bits = there ? load_shared(first + step * lane_ + 12) & 0xFFFFu : 1;
     const std::uint32_t more = __popc(bits) - 1;  // than one
     std::uint32_t before = lane_;
 #pragma unroll
@@ -194,7 +215,7 @@ class WalkStack {
     std::uint32_t from = 0, left = 0;
     if (out.mine) {
       const std::uint32_t up_to = starts & (2 * lanes_below() + 1);
-      from = newest + kStep * (__popc(up_to) - 1);
+      from = first + step * (__popc(up_to) - 1);
       out.entry = load_shared4(from);
       out.bit = position_of(positions_, out.entry.w & 0xFFFFu, lane_ - (31 - __clz(static_cast<int>(up_to))));
       left = out.entry.w & (0xFFFEu << out.bit & 0xFFFFu);
@@ -209,6 +230,7 @@ class WalkStack {
   const std::uint32_t memory_;     // address
   const std::uint32_t& size_;
   const std::uint32_t lane_;
+  std::uint32_t base_ = 0;                      // entries of memory before the stack, free
   std::uint32_t height_ = 0, leaf_pairs_ = 0;   // entries
   std::uint32_t waiting_ = 0, candidates_ = 0;  // their bits
 };

@@ -82,31 +82,37 @@ using BoxTest = std::function<Left(std::uint32_t level, bool may_go_on)>;
 /// The stack of a warp, as walk_stack.cuh and walk.cuh have it, but for what its entries are.
 class StackModel {
  public:
-  StackModel(std::uint32_t depth, std::uint32_t reserve, BoxTest test)
-      : levels_(2 * depth), reserve_(reserve), size_(reserve + kFewestEntries), test_(std::move(test)) {}
+  StackModel(std::uint32_t depth, std::uint32_t reserve, std::uint32_t entries, BoxTest test)
+      : levels_(2 * depth), reserve_(reserve), size_(reserve + entries), test_(std::move(test)) {}
 
-  /// The walk of so many object pairs, and of gifts. Result: the most entries that it ever had.
+  /// The walk of so many object pairs, and of gifts received. Result: the most entries that it ever had room
+  /// for.
   std::uint32_t run(std::uint32_t object_pairs, std::uint32_t gifts, std::mt19937& random) {
     std::uint32_t most = 0;
     for (int step = 0; step < 30'000; ++step) {
-      while (count(leaf_pairs_) >= 32) take(leaf_pairs_, 32);
+      while (count(leaf_pairs_) >= 32) take_newest(leaf_pairs_, 32);
+      if (room() < reserve_ + kRoomForOldest) base_ = 0;
       for (; count(stack_) < 32 && object_pairs != 0; --object_pairs) {
         for (int i = 0; i < 16; ++i) stack_.push_back({1, 1});
         most = std::max(most, height());
       }
       if (stack_.empty() && gifts != 0) {
+        base_ = 0;
         for (int i = 0; i < 32; ++i)
           stack_.push_back({1 + static_cast<std::uint32_t>(random()) % (levels_ - 1), 16});
         --gifts;
       }
       if (stack_.empty()) break;
-      const std::uint32_t room = size_ > height() ? size_ - height() : 0;
-      for (const std::uint32_t level : take(stack_, block_pairs_to_take(count(stack_), room, reserve_))) {
+      const bool oldest = object_pairs == 0 && has_room_for_oldest(room(), reserve_);
+      const std::uint32_t bits = block_pairs_to_take(count(stack_), room(), reserve_);
+      for (const std::uint32_t level : oldest ? take_oldest(bits) : take_newest(stack_, bits)) {
         const bool last = level + 1 >= levels_;
         const Left left = test_(level + 1, !last);
         if (left.bits != 0) (left.of_leaves || last ? leaf_pairs_ : stack_).push_back({level + 1, left.bits});
       }
       most = std::max(most, height());
+      if (count(stack_) >= 32 && stack_.size() >= 2 && random() % 64 == 0)
+        drop_oldest(std::min<std::size_t>(stack_.size() / 2, 32));  // a gift to another warp
     }
     return most;
   }
@@ -119,10 +125,31 @@ class StackModel {
     for (const Entry& entry : entries) bits += entry.bits;
     return bits;
   }
-  std::uint32_t height() const { return static_cast<std::uint32_t>(stack_.size() + leaf_pairs_.size()); }
+  std::uint32_t height() const {
+    return base_ + static_cast<std::uint32_t>(stack_.size() + leaf_pairs_.size());
+  }
+  std::uint32_t room() const { return size_ > height() ? size_ - height() : 0; }
+
+  /// The memory of the oldest entries is not free at once.
+  void drop_oldest(std::size_t entries) {
+    stack_.erase(stack_.begin(), stack_.begin() + static_cast<std::ptrdiff_t>(entries));
+    base_ += static_cast<std::uint32_t>(entries);
+  }
+
+  /// Levels of the entries from which the oldest bits come.
+  std::vector<std::uint32_t> take_oldest(std::uint32_t bits) {
+    std::vector<std::uint32_t> levels;
+    std::size_t emptied = 0;
+    for (; bits != 0; --bits) {
+      levels.push_back(stack_[emptied].level);
+      if (--stack_[emptied].bits == 0) ++emptied;
+    }
+    drop_oldest(emptied);
+    return levels;
+  }
 
   /// Levels of the entries from which the newest bits come.
-  static std::vector<std::uint32_t> take(std::vector<Entry>& entries, std::uint32_t bits) {
+  static std::vector<std::uint32_t> take_newest(std::vector<Entry>& entries, std::uint32_t bits) {
     std::vector<std::uint32_t> levels;
     for (; bits != 0; --bits) {
       levels.push_back(entries.back().level);
@@ -132,19 +159,21 @@ class StackModel {
   }
 
   std::uint32_t levels_, reserve_, size_;
+  std::uint32_t base_ = 0;  // entries of memory before the stack
   BoxTest test_;
   std::vector<Entry> stack_, leaf_pairs_;
 };
 
-std::uint32_t most_entries(std::uint32_t depth, std::uint32_t reserve, const BoxTest& test,
-                           std::uint32_t& size) {
+std::uint32_t most_entries(std::uint32_t depth, std::uint32_t reserve, std::uint32_t entries,
+                           const BoxTest& test, std::uint32_t& size) {
   std::mt19937 random(1);
-  StackModel stack(depth, reserve, test);
+  StackModel stack(depth, reserve, entries, test);
   size = stack.size();
   return stack.run(6, 6, random);
 }
 
-/// Whatever tests leave, a stack with the fewest entries is high enough.
+/// Whatever tests leave, a stack is high enough: with the fewest entries, with the most, and with just enough
+/// for steps that take the oldest.
 TEST(WalkShape, StacksNeverOverflow) {
   std::mt19937 random(2);
   const BoxTest everything = [](std::uint32_t, bool) { return Left{false, 16}; };
@@ -164,8 +193,11 @@ TEST(WalkShape, StacksNeverOverflow) {
       });
     }
     for (const BoxTest& test : tests) {
-      std::uint32_t size = 0;
-      EXPECT_LE(most_entries(depth, stack_reserve(depth), test, size), size) << "depth " << depth;
+      for (const std::uint32_t entries : {kFewestEntries, kRoomForOldest + 1, kEntries}) {
+        std::uint32_t size = 0;
+        EXPECT_LE(most_entries(depth, stack_reserve(depth), entries, test, size), size)
+            << "depth " << depth << ", " << entries << " entries";
+      }
     }
   }
 }
@@ -174,7 +206,7 @@ TEST(WalkShape, StacksNeverOverflow) {
 TEST(WalkShape, StacksOverflowWithASmallerReserve) {
   const BoxTest test = [](std::uint32_t, bool goes_on) { return Left{!goes_on, goes_on ? 16u : 1u}; };
   std::uint32_t size = 0;
-  EXPECT_GT(most_entries(64, stack_reserve(32), test, size), size);
+  EXPECT_GT(most_entries(64, stack_reserve(32), kFewestEntries, test, size), size);
 }
 
 }  // namespace

@@ -63,6 +63,10 @@ class RegionFinder {
     while (joined_to(curve) != curve) curve = joined_to(curve);
     return curve;
   }
+  TANDEM_HD void unite(std::uint32_t i, std::uint32_t j) const {
+    const std::uint32_t p = first_of(i), q = first_of(j);
+    joined_to(greater(p, q)) = lesser(p, q);
+  }
   /// The place of a curve that is nearest to the middle of all.
   TANDEM_HD Place place_in(std::uint32_t curve) const {
     const std::uint32_t piece = piece_of(curve);
@@ -183,6 +187,7 @@ TANDEM_HD void RegionFinder<Team>::begin(std::uint32_t curve) {
     sums.add(memory_, memory_.order[i], summary_.origin, 1 / summary_.unit);
   add_up(team_, sums.area.x, sums.area.y, sums.area.z);
   if (team_.rank() == 0) {
+    joined_to(curve) = curve;
     piece_of(curve) = place.piece;
     partners_of(curve, 0) = partners_of(curve, 1) = 0;
     area_of(curve) = sums.area.value(1);
@@ -235,7 +240,10 @@ TANDEM_HD void RegionFinder<Team>::try_to_join(std::uint32_t curve, int k) {
   if (other == kNoIndex) return;
   // Where all are each other's neighbours, the other way is tried as well.
   if (summary_.curves <= kNeighbours + 1 && comes_first(other, curve)) return;
+  // One thread tries one neighbour after the other, and knows which curves are joined by now.
+  if (Team::size() == 1 && first_of(curve) == first_of(other)) return;
   if (!is_joined(curve, other) || team_.rank() != 0) return;
+  if (Team::size() == 1) unite(curve, other);
   team_.set_bits(partners_of(curve, k / 4), (other + 1) << (8 * (k % 4)));
 }
 
@@ -243,10 +251,8 @@ template <typename Team>
 TANDEM_HD std::uint32_t RegionFinder<Team>::join() {
   const std::uint32_t curves = summary_.curves;
   bool any = false;
-  for (std::uint32_t c = team_.rank(); c < curves; c += team_.size()) {
-    joined_to(c) = c;
+  for (std::uint32_t c = team_.rank(); c < curves; c += team_.size())
     any = any || (partners_of(c, 0) | partners_of(c, 1)) != 0;
-  }
   if (!team_.any(any)) return curves;
   team_.sync();
   if (team_.rank() == 0) {
@@ -254,8 +260,7 @@ TANDEM_HD std::uint32_t RegionFinder<Team>::join() {
       for (std::uint32_t word = 0; word < 2; ++word) {
         for (std::uint32_t partners = partners_of(c, static_cast<int>(word)); partners != 0; partners >>= 8) {
           if ((partners & 0xFFu) == 0) continue;
-          const std::uint32_t p = first_of(c), q = first_of((partners & 0xFFu) - 1);
-          joined_to(greater(p, q)) = lesser(p, q);
+          unite(c, (partners & 0xFFu) - 1);
         }
       }
     }

@@ -94,7 +94,9 @@ class DeepestLine {
   /// Takes such points. This comes before the functions below.
   TANDEM_HD void begin(const Seeds& seeds) {
     team_.sync();
-    if (team_.rank() == 0) shared_.seeds = seeds;
+    for (int i = static_cast<int>(team_.rank()); i < seeds.count; i += static_cast<int>(team_.size()))
+      shared_.seeds.at[i] = seeds.at[i], shared_.seeds.beside[i] = seeds.beside[i];
+    if (team_.rank() == 0) shared_.seeds.count = seeds.count;
     team_.sync();
   }
 

@@ -9,7 +9,7 @@ def shown(text, least):
 
 def spread(texts):
     """The smallest and the largest of some figures."""
-    least, most = min(texts, key=float), max(texts, key=float)
+    least, most = (choose(texts, key=lambda text: float(text.replace(",", ""))) for choose in (min, max))
     return least if least == most else f"{least} to {most}"
 
 
@@ -30,4 +30,15 @@ def peers(rows):
     for peer in dict.fromkeys(row["peer"] for row in rows):
         groups = [[row for row in rows if row["peer"] == peer and row["bodies"].endswith(end)] for end in ("box", "block")]
         lines.append([peer, *(cell for group in groups for cell in cells(group))])
+    return markdown(heads, lines)
+
+
+def threads(rows):
+    """One row for each peer: nuts on bolts, in few worlds and in many."""
+    heads = ["peer", "normal off, °", "depth off, %", "invented", "µs a pair"]
+    lines = []
+    for peer in dict.fromkeys(row["peer"] for row in rows):
+        own = [row for row in rows if row["peer"] == peer]
+        lines.append([peer, error(own, "normal_degrees", 1e-3), error(own, "depth_percent", 1e-2), max((row["invented"] for row in own), key=int),
+                      spread([three_digits(float(row["microseconds"])) for row in own])])
     return markdown(heads, lines)

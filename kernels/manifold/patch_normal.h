@@ -123,8 +123,7 @@ class NormalFinder {
   std::uint32_t begin_, end_;
   LeastPiece least_;  // of those that this one of the team sees
   int directions_ = 0;
-  bool surrounds_hole_ = false;  ///< the curve, and none is joined with it that surrounds it
-  bool several_faces_ = false;   ///< face_nearest() had to choose between faces
+  bool several_faces_ = false;  ///< face_nearest() had to choose between faces
 };
 
 template <typename Team>
@@ -612,7 +611,7 @@ TANDEM_HD_CALLED int NormalFinder<Team>::gather_for_deep(const CurveMeasure& cur
   // Areas of two curves that cancel leave rounding.
   const bool counts = size > kLeastArea * curve.length * (curve.by_area ? curve.length : 1.0);
   const bool joined = memory_.pieces[memory_.order[begin_]].joined != 0;
-  const bool both_ways = joined || summary_.degenerate || !counts || !curve.by_area || surrounds_hole_;
+  const bool both_ways = joined || summary_.degenerate || !counts || !curve.by_area;
   const Vector3 line = longest_line(curve.middle), push = both_ways ? Vector3{} : (1 / size) * own;
   gather_unlike(0, line, push);
   gather_unlike(1, line, push);
@@ -676,10 +675,7 @@ TANDEM_HD PatchNormal NormalFinder<Team>::find(const CurveMeasure& curve) {
     if (no_area || separating == 1) return out;
   }
   const bool joined = memory_.pieces[memory_.order[begin_]].joined != 0;
-  // Around a hole that was not joined with what surrounds it, the area points against the faces.
-  surrounds_hole_ =
-      !joined && summary_.curves > 1 && curve.closed && curve.by_area && dot(sheet_normal(), curve.area) < 0;
-  if (joined || surrounds_hole_) {
+  if (joined) {
     out.kind = PatchKind::deep;
     return out;
   }

@@ -490,35 +490,6 @@ TEST(SolidOnSolid, TheAreaVectorIsThatOfTheSurfaceInside) {
   EXPECT_GE(exact, seen - seen / 500 - 1);
 }
 
-// Polyhedra of nearly the same sphere, one in the other, overlap in many thin pieces. A curve around a hole
-// in one of these, if no straight line joins it with what surrounds the piece, has an area that points the
-// wrong way.
-TEST(SolidInSolid, ABallPushesItsHollowOutwardsEverywhere) {
-  RandomPoses random(11);
-  Mesh inside = sphere(0.5, 3);
-  for (auto& corners : inside.triangles) std::swap(corners[1], corners[2]);
-  ManifoldScene scene;
-  scene.add_body(scene.add_shape(sphere(0.5, 3)), kIdentityPose);
-  scene.add_body(scene.add_shape(joined(sphere(1, 2), inside)), kIdentityPose);
-  std::size_t others = 0;
-  for (int trial = 0; trial < trials(20, 3); ++trial) {
-    scene.bodies[0].pose = any_motion(random, 0);
-    const Pose motion = any_motion(random, 3);
-    scene.find(motion);
-    const double* middle = motion.translation;
-    const auto is_wrong = [&](const Manifold& m) {
-      const Vector3 out = vector_of(m.centre) - Vector3{middle[0], middle[1], middle[2]};
-      return m.depth > 0.1 || !(dot(vector_of(m.normal), out) > 0);
-    };
-    // A net of overlap may go round half of the ball, and ends only when b has moved far. The bodies are
-    // symmetric, so there are two.
-    const auto wrong = std::ranges::count_if(scene.manifolds(), is_wrong);
-    EXPECT_LE(wrong, 2) << trial;
-    others += scene.manifolds().size() - static_cast<std::size_t>(wrong);
-  }
-  EXPECT_GT(others, 0u);
-}
-
 // The vertex of one link that lies furthest along the normal may be on the far side of the other link's hole:
 // what is between belongs to neither.
 TEST(LinksOfAChain, OverlapByNoMoreThanTheyWerePulled) {

@@ -29,6 +29,10 @@ inline constexpr double kDeepEnough = 1e-6;
 /// no flat one, and may have several places where it is deep. Lines go through more points then.
 inline constexpr double kNotFlat = 0.1;
 
+/// A patch whose curve is longer than its reach by this factor winds, as a thread does: the curve around a
+/// convex flat one is 2 pi times as long at most. It may have several such places too.
+inline constexpr double kWinds = 8;
+
 /// The search looks at no more lines than this, beside those through the first points.
 inline constexpr int kMostSteps = 16;
 
@@ -111,9 +115,11 @@ class DeepestLine {
   TANDEM_HD void begin_with_seeds(const PatchFrame& frame, double reach);
 
   /// Finds shared.best; none where the bodies do not overlap along the normal. middle, reach: a ball around
-  /// the pieces. If there are several regions, the line goes through it. The search ends as soon as a line is
-  /// as deep as `enough`, which others may lower meanwhile.
-  TANDEM_HD void find(const PatchFrame& frame, const Vector3& middle, double reach, const double& enough);
+  /// the pieces. If there are several regions, the line goes through it. winds: the overlap may have several
+  /// places where it is deep, even if it is flat. The search ends as soon as a line is as deep as `enough`,
+  /// which others may lower meanwhile.
+  TANDEM_HD void find(const PatchFrame& frame, const Vector3& middle, double reach, bool winds,
+                      const double& enough);
 
  private:
   template <typename PointAt>
@@ -532,14 +538,14 @@ TANDEM_HD void DeepestLine<Team>::search_from_seeds(const double& enough) {
 
 template <typename Team>
 TANDEM_HD void DeepestLine<Team>::find(const PatchFrame& frame, const Vector3& middle, double reach,
-                                       const double& enough) {
+                                       bool winds, const double& enough) {
   if (team_.rank() == 0) see(enough);
   for (bool again = true, looked = false; again; looked = true) {
     begin_with_seeds(frame, reach);
     if (!shared_.best.found() || (!looked && is_deep_enough())) return;
     begin_half_spaces(middle, reach);
-    again = !looked && shared_.best.depth() > kNotFlat * reach && (not_convex_ || goes_on_elsewhere()) &&
-            look_around(middle, reach);
+    again = !looked && (winds || shared_.best.depth() > kNotFlat * reach) &&
+            (not_convex_ || goes_on_elsewhere()) && look_around(middle, reach);
   }
   search_from_seeds(enough);
   go_to_ends();

@@ -57,8 +57,9 @@ class ManifoldMaker {
   /// Takes the deepest line of a patch that is not deep. It is called by one of the team.
   TANDEM_HD static void take_deepest(const OverlapLine& line, const BodyPair& bodies, PatchState& state);
 
-  /// Finds the direction in which the overlap of a deep patch is shallowest, the rim and depths. The patch is
-  /// ambiguous if the bodies do not overlap along any direction.
+  /// Finds the direction in which the overlap of a deep patch is shallowest, the rim and depths. If the
+  /// bodies do not overlap along any direction, the patch is a touch where its area says how it pushes, and
+  /// ambiguous elsewhere.
   TANDEM_HD_CALLED void end_deep(std::uint32_t region, const DepthSearch& search, const DeepLines& found,
                                  OutlineMemory& shared, LineMemory& lines);
 
@@ -215,7 +216,8 @@ TANDEM_HD OverlapLine ManifoldMaker<Team>::line_along(std::uint32_t region, cons
                                                       int direction, SearchMemory& shared) const {
   DeepestLine<Team> line(team_, bodies_, memory_, summary_, region, shared);
   line.begin(search.seeds);
-  line.find(PatchFrame(summary_.origin, search.along(direction)), search.middle, search.reach, search.enough);
+  line.find(PatchFrame(summary_.origin, search.along(direction)), search.middle, search.reach,
+            search.measure.length > kWinds * search.reach, search.enough);
   return line.best();
 }
 
@@ -244,6 +246,9 @@ TANDEM_HD_CALLED void ManifoldMaker<Team>::end_deep(std::uint32_t region, const 
     normal.n = search.along(i), normal.kind = PatchKind::overlap;
     deepest = found.along[i];
   }
+  // Surfaces that cut themselves may have no inside there; the area still says where the patch pushes.
+  const Vector3 push = search.measure.push();
+  if (normal.kind != PatchKind::overlap && dot(push, push) > 0) normal = {push, PatchKind::overlap};
   take_normal(search.measure, normal);
   if (state_.kind != PatchKind::overlap) return;
   find_rim(region, search.measure, shared);
@@ -253,7 +258,7 @@ TANDEM_HD_CALLED void ManifoldMaker<Team>::end_deep(std::uint32_t region, const 
   team_.sync();
   walk_lines(team_, questions, asked);
   take_rim(lines);
-  const bool through = goes_through(deepest, lines);
+  const bool through = deepest.found() && goes_through(deepest, lines);
   if (team_.rank() == 0) {
     state_.goes_through = through;
     take_deepest(deepest, bodies_, state_);

@@ -221,7 +221,7 @@ TANDEM_HD std::uint32_t OverlapLines<Team>::go_inside(int count, double most, st
       const Crossing& crossing = line[side].best;
       // A line that runs in a flush face does not leave the body there, or comes back into it.
       within = within &&
-               (!bodies_[side].shape->closed || (crossing.found() && leaves(side, crossing, line->frame->n)));
+               (crossing.found() ? leaves(side, crossing, line->frame->n) : !bodies_[side].shape->closed);
       if (crossing.found()) end = lesser(crossing.height, end);
     }
     shared_.inside[i] = line->frame->at({}, end / 2);

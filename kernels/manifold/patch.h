@@ -15,6 +15,10 @@ struct Patch {
   ManifoldPoint point[kMostManifoldPoints];
 };
 
+/// The area vector of a region of several curves, or of one whose parts cancel, has a direction if it is more
+/// than this part of the square of the curves' length.
+inline constexpr double kLeastArea = 1e-6;
+
 /// Sums over the pieces of a curve.
 struct CurveSums {
   ExactVectorSum area, gap, middle;
@@ -46,6 +50,14 @@ struct CurveMeasure {
   Vector3 sheet_normal;  ///< of the pieces' triangles, from a towards b, times lengths, where the area does
                          ///< not say it; of open surfaces where there are any
   std::uint64_t key = 0;
+
+  /// The unit vector along which the area, or what stands for it, says that the patch pushes; 0 where parts
+  /// of the curve cancel each other, so that rounding is left.
+  TANDEM_HD Vector3 push() const {
+    const Vector3& own = by_area ? area : sheet_normal;
+    const double size = norm(own);
+    return size > kLeastArea * length * (by_area ? length : 1.0) ? (1 / size) * own : Vector3{};
+  }
 };
 
 /// Unit normals of float32 whose difference's square is less are of one face: half a milliradian.

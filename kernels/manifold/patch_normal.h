@@ -6,10 +6,6 @@ namespace tandem::manifold {
 /// An area vector below this part of length times largest coordinate is rounding: the surfaces only touch.
 inline constexpr double kNoArea = 0x1p-40;
 
-/// The area vector of a region of several curves, or of one whose parts cancel, has a direction if it is more
-/// than this part of the square of the curves' length.
-inline constexpr double kLeastArea = 1e-6;
-
 /// A curve whose ends are apart by less than this part of its length closes.
 inline constexpr double kClosed = 1e-6;
 
@@ -75,7 +71,7 @@ class NormalFinder {
   TANDEM_HD std::uint32_t& mark(std::uint32_t i) const { return memory_.curve[i]; }
   TANDEM_HD_CALLED bool has_free_end() const;
   TANDEM_HD_CALLED Vector3 plain_middle() const;
-  TANDEM_HD_CALLED Vector3 sheet_normal() const;
+  TANDEM_HD_CALLED Vector3 sum_of_normals(bool of_a, bool of_b) const;
   TANDEM_HD bool has_many_directions(int side) const;
   TANDEM_HD LeastPiece least_unmarked(int side, const FloatVector& known) const;
   TANDEM_HD bool gather_directions(int side, bool keep_if_many);
@@ -123,7 +119,8 @@ class NormalFinder {
   std::uint32_t begin_, end_;
   LeastPiece least_;  // of those that this one of the team sees
   int directions_ = 0;
-  bool several_faces_ = false;  ///< face_nearest() had to choose between faces
+  bool surrounds_hole_ = false;  ///< the curve, and none is joined with it that surrounds it
+  bool several_faces_ = false;   ///< face_nearest() had to choose between faces
 };
 
 template <typename Team>
@@ -151,7 +148,10 @@ TANDEM_HD CurveMeasure NormalFinder<Team>::measure() {
   out.middle =
       summary_.origin + (out.length > 0 ? (unit / out.length) * sums.middle.value(unit) : plain_middle());
   out.by_area = out.closed && !rounding;
-  if (!out.by_area) out.sheet_normal = sheet_normal();
+  if (!out.by_area) {
+    const bool sheet_a = !bodies_.a.shape->closed, sheet_b = !bodies_.b.shape->closed;
+    out.sheet_normal = sum_of_normals(sheet_a || !sheet_b, sheet_b || !sheet_a);
+  }
   out.by_area = out.by_area || (out.closed && !(norm(out.sheet_normal) > kNoArea * out.length));
   return out;
 }
@@ -183,16 +183,16 @@ TANDEM_HD_CALLED Vector3 NormalFinder<Team>::plain_middle() const {
   return (1.0 / (end_ - begin_)) * sum.value(summary_.unit);
 }
 
+/// Returns the sum of the normals of the pieces' triangles, from a towards b, times lengths.
 template <typename Team>
-TANDEM_HD_CALLED Vector3 NormalFinder<Team>::sheet_normal() const {
-  const bool sheet_a = !bodies_.a.shape->closed, sheet_b = !bodies_.b.shape->closed;
+TANDEM_HD_CALLED Vector3 NormalFinder<Team>::sum_of_normals(bool of_a, bool of_b) const {
   const double unit = summary_.unit, one_by_unit = 1 / unit;
   ExactVectorSum sum;
   for_each_piece([&](const Piece& piece, const float* normals) {
     if (piece.kind() == MeetingKind::polygon) return;
     const double size = norm(piece.weight() * (piece.end[1] - piece.end[0]));
-    if (sheet_a || !sheet_b) sum.add(size * Vector3{normals[0], normals[1], normals[2]}, one_by_unit);
-    if (sheet_b || !sheet_a) sum.add(-(size * Vector3{normals[3], normals[4], normals[5]}), one_by_unit);
+    if (of_a) sum.add(size * Vector3{normals[0], normals[1], normals[2]}, one_by_unit);
+    if (of_b) sum.add(-(size * Vector3{normals[3], normals[4], normals[5]}), one_by_unit);
   });
   add_up(team_, sum.x, sum.y, sum.z);
   return sum.value(unit);
@@ -606,13 +606,11 @@ TANDEM_HD_CALLED void NormalFinder<Team>::gather_unlike(int side, const Vector3&
 template <typename Team>
 TANDEM_HD_CALLED int NormalFinder<Team>::gather_for_deep(const CurveMeasure& curve) {
   directions_ = 0;
-  const Vector3 own = curve.by_area ? curve.area : curve.sheet_normal;
-  const double size = norm(own);
-  // Areas of two curves that cancel leave rounding.
-  const bool counts = size > kLeastArea * curve.length * (curve.by_area ? curve.length : 1.0);
+  const Vector3 own = curve.push();
+  const bool counts = dot(own, own) > 0;
   const bool joined = memory_.pieces[memory_.order[begin_]].joined != 0;
-  const bool both_ways = joined || summary_.degenerate || !counts || !curve.by_area;
-  const Vector3 line = longest_line(curve.middle), push = both_ways ? Vector3{} : (1 / size) * own;
+  const bool both_ways = joined || summary_.degenerate || !counts || !curve.by_area || surrounds_hole_;
+  const Vector3 line = longest_line(curve.middle), push = both_ways ? Vector3{} : own;
   gather_unlike(0, line, push);
   gather_unlike(1, line, push);
   int count = 0;
@@ -623,7 +621,7 @@ TANDEM_HD_CALLED int NormalFinder<Team>::gather_for_deep(const CurveMeasure& cur
   };
   team_.sync();
   if (team_.rank() == 0) {
-    if (counts) add((1 / size) * own);
+    if (counts) add(own);
     for (int i = 0; i < directions_; ++i) add(shared_.direction[i].n);
     shared_.count = count;
     shared_.both_ways = both_ways;
@@ -675,7 +673,10 @@ TANDEM_HD PatchNormal NormalFinder<Team>::find(const CurveMeasure& curve) {
     if (no_area || separating == 1) return out;
   }
   const bool joined = memory_.pieces[memory_.order[begin_]].joined != 0;
-  if (joined) {
+  // Around a hole that was not joined with what surrounds it, the area points against the faces.
+  surrounds_hole_ = !joined && summary_.curves > 1 && curve.closed && curve.by_area &&
+                    dot(sum_of_normals(true, true), curve.area) < 0;
+  if (joined || surrounds_hole_) {
     out.kind = PatchKind::deep;
     return out;
   }

@@ -152,6 +152,26 @@ Mesh ring(int corners, double radius, int tube_corners, double tube_radius) {
   return mesh;
 }
 
+Mesh spring(int corners, int turns, double inner_radius, double outer_radius, double pitch, double height) {
+  const double section[4][2] = {
+      {inner_radius, 0}, {outer_radius, 0}, {outer_radius, height}, {inner_radius, height}};
+  const auto place = [&](int i, int j) -> std::array<float, 3> {
+    const auto& p = section[j % 4];
+    const double angle = 2 * 3.14159265358979323846 * i / corners;
+    return {static_cast<float>(p[0] * std::cos(angle)), static_cast<float>(p[0] * std::sin(angle)),
+            static_cast<float>(p[1] + pitch * i / corners)};
+  };
+  Mesh mesh;
+  const int end = corners * turns;
+  for (int i = 0; i < end; ++i) {
+    for (int j = 0; j < 4; ++j)
+      add_square(mesh, place(i, j), place(i + 1, j), place(i + 1, j + 1), place(i, j + 1));
+  }
+  add_square(mesh, place(0, 0), place(0, 1), place(0, 2), place(0, 3));
+  add_square(mesh, place(end, 0), place(end, 3), place(end, 2), place(end, 1));
+  return mesh;
+}
+
 Mesh cup(int sectors, float radius, float height, float wall) {
   const std::array<float, 2> profile[] = {
       {0, 0}, {radius, 0}, {radius, height}, {radius - wall, height}, {radius - wall, wall}, {0, wall}};

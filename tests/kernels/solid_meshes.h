@@ -34,6 +34,9 @@ Mesh pipe(int corners, double inner_radius, double outer_radius, float height);
 /// A ring about the z axis: a tube of regular polygons around a regular polygon of this radius.
 Mesh ring(int corners, double radius, int tube_corners, double tube_radius);
 
+/// A flat spring about the z axis: a rectangle that is turned and rises by its pitch with each turn.
+Mesh spring(int corners, int turns, double inner_radius, double outer_radius, double pitch, double height);
+
 /// A cup that stands on z = 0: a profile that is turned about the z axis.
 Mesh cup(int sectors, float radius, float height, float wall);
 

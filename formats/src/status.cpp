@@ -107,6 +107,8 @@ constexpr Entry kEntries[] = {
     {kBadReach, "BadReach", nullptr, "`reach` or `within` is negative, not a number or too large"},
     {kBadTolerance, "BadTolerance", nullptr, "a tolerance is negative, not a number or too large"},
     {kBadDuration, "BadDuration", nullptr, "the duration of a step is negative or not finite"},
+    {kNoMass, "NoMass", "instance",
+     "the mesh of a moving body has no extent, or its density is not positive"},
     {kNoFinestLevel, "NoFinestLevel", nullptr,
      "a query by tolerance needs the finest level, and the asset was given without"},
     {kNoGpu, "NoGpu", nullptr, "there is no GPU that can be used"},

@@ -57,9 +57,10 @@ struct alignas(64) PairPatches {
     if (!pieces_.resize(contacts) || !normals_.resize(6 * contacts + 1) ||
         !words_.resize((3 + kTableWords) * contacts + 1 + ManifoldLanes::kMoreTableWords))
       return false;
-    std::uint32_t* const word = words_.data();
-    memory = {pieces_.data(),  normals_.data(),     word,
-              word + contacts, word + 2 * contacts, word + 3 * contacts + 1};
+    // The table comes first: it has float64 numbers for a while.
+    std::uint32_t *const table = words_.data(), *const word = table + kTableWords * contacts +
+                                                              ManifoldLanes::kMoreTableWords;
+    memory = {pieces_.data(), normals_.data(), word, word + contacts, word + 2 * contacts, table};
     return true;
   }
 

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "bvhbench/engines/registry.h"
-#include "simulator/contact_scene.h"
+#include "kernels/manifold/manifold_scene.h"
 
 namespace tandem::test {
 
@@ -21,8 +21,8 @@ struct Pile {
     assets.add(joined(sphere(0.4, 3), moved(sphere(0.3, 3), 0.6f, 0, 0)));
     bodies.push_back({0, kIdentityPose});
     for (int i = 0; i < count; ++i) {
-      bodies.push_back({1, to_pose(at(random.symmetric(2), random.symmetric(2), random.uniform(-0.3, 1.5)) *
-                                   random_motion(random, 0))});
+      bodies.push_back({1, after(shift(random.symmetric(2), random.symmetric(2), random.uniform(-0.3, 1.5)),
+                                 any_motion(random, 0))});
     }
   }
   void step() {

@@ -1,16 +1,14 @@
 #include "analytic_contacts.h"
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
 #include "kernels/geometry/pair_motion.h"
+#include "kernels/manifold/manifold_scene.h"
 
 namespace tandem::simulation {
 namespace {
-
-using Eigen::Vector3d;
 
 constexpr double kWide = 1e4;  // the radius of a half-space
 
@@ -25,23 +23,17 @@ AssetBox cube_of(double radius) {
   return asset_box({-half, -half, -half}, {half, half, half}, {0, 0, 0});
 }
 
-Vector3d to_world(const Pose& pose, const Vector3d& point) {
-  Vector3d out;
-  apply(pose, point.x(), point.y(), point.z(), out.data());
-  return out;
+Matrix3 rotation_of(const Pose& pose) {
+  return {{vector_of(pose.rotation[0]), vector_of(pose.rotation[1]), vector_of(pose.rotation[2])}};
 }
 
-Eigen::Matrix3d rotation_of(const Pose& pose) {
-  return Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(&pose.rotation[0][0]);
-}
-
-Vector3d to_body(const Pose& pose, const Vector3d& point) {
-  return rotation_of(pose).transpose() * (point - Eigen::Map<const Vector3d>(pose.translation));
+Vector3 to_body(const Pose& pose, const Vector3& point) {
+  return transposed(rotation_of(pose)) * (point - vector_of(pose.translation));
 }
 
 class BoxesOnPlane : public AnalyticContacts {
  public:
-  BoxesOnPlane(const Vector3d& normal, const Vector3d& size, double flicker)
+  BoxesOnPlane(const Vector3& normal, const Vector3& size, double flicker)
       : normal_(normal), half_(0.5 * size), flicker_(flicker) {}
 
  private:
@@ -51,52 +43,52 @@ class BoxesOnPlane : public AnalyticContacts {
       on_box(i, bodies[i].pose, bodies[i + 1].pose, points);
     for (ContactPoint& point : points) point.depth += flicker_ * static_cast<double>(++calls_ % 3);
   }
-  double radius(std::uint32_t body) const override { return body == 0 ? kWide : half_.norm(); }
+  double radius(std::uint32_t body) const override { return body == 0 ? kWide : norm(half_); }
 
-  Vector3d corner(int i) const {
-    return {i & 1 ? half_.x() : -half_.x(), i & 2 ? half_.y() : -half_.y(), i & 4 ? half_.z() : -half_.z()};
+  Vector3 corner(int i) const {
+    return {i & 1 ? half_.x : -half_.x, i & 2 ? half_.y : -half_.y, i & 4 ? half_.z : -half_.z};
   }
 
   void on_plane(std::uint32_t body, const Pose& pose, std::vector<ContactPoint>& points) const {
     for (int i = 0; i < 8; ++i) {
-      const Vector3d at = to_world(pose, corner(i));
-      const double height = normal_.dot(at);
+      const Vector3 at = test::apply(pose, corner(i));
+      const double height = dot(normal_, at);
       if (height <= 0) points.push_back({0, body, at, normal_, -height, static_cast<std::uint64_t>(i + 1)});
     }
   }
 
   void on_box(std::uint32_t body, const Pose& lower, const Pose& upper,
               std::vector<ContactPoint>& points) const {
-    const Vector3d up = rotation_of(lower) * Vector3d::UnitZ();
+    const Vector3 up = rotation_of(lower) * kUp;
     for (int i = 0; i < 4; ++i) {
-      const Vector3d at = to_world(upper, corner(i)), seen = to_body(lower, at);
-      const bool over = std::fabs(seen.x()) <= 1.1 * half_.x() && std::fabs(seen.y()) <= 1.1 * half_.y();
-      const double depth = half_.z() - seen.z();
+      const Vector3 at = test::apply(upper, corner(i)), seen = to_body(lower, at);
+      const bool over = std::fabs(seen.x) <= 1.1 * half_.x && std::fabs(seen.y) <= 1.1 * half_.y;
+      const double depth = half_.z - seen.z;
       if (over && depth >= 0)
         points.push_back({body, body + 1, at, up, depth, static_cast<std::uint64_t>(i + 1)});
     }
   }
 
-  Vector3d normal_, half_;
+  Vector3 normal_, half_;
   double flicker_;
   std::uint64_t calls_ = 0;
 };
 
 class BallsOnPlane : public AnalyticContacts {
  public:
-  BallsOnPlane(const Vector3d& normal, double radius) : normal_(normal), radius_(radius) {}
+  BallsOnPlane(const Vector3& normal, double radius) : normal_(normal), radius_(radius) {}
 
  private:
   void find_all(std::span<const BodyPose> bodies, std::vector<ContactPoint>& points) override {
     for (std::uint32_t i = 1; i < bodies.size(); ++i) {
-      const Vector3d centre = to_world(bodies[i].pose, Vector3d::Zero());
-      const double depth = radius_ - normal_.dot(centre);
+      const Vector3 centre = test::apply(bodies[i].pose, Vector3{});
+      const double depth = radius_ - dot(normal_, centre);
       if (depth >= 0) points.push_back({0, i, centre - radius_ * normal_, normal_, depth, 1});
     }
   }
   double radius(std::uint32_t body) const override { return body == 0 ? kWide : radius_; }
 
-  Vector3d normal_;
+  Vector3 normal_;
   double radius_;
 };
 
@@ -133,13 +125,13 @@ const std::vector<ContactPoint>& AnalyticContacts::find(std::span<const BodyPose
   return points_;
 }
 
-BodyProperties box_body(const Vector3d& size, double mass) {
+BodyProperties box_body(const Vector3& size, double mass) {
   BodyProperties body;
   body.mass = mass;
-  body.radius = 0.5 * size.norm();
-  const Vector3d squares = size.cwiseProduct(size);
-  body.inertia = (mass / 12 * (Vector3d::Constant(squares.sum()) - squares)).asDiagonal();
-  body.inverse_inertia = body.inertia.inverse();
+  body.radius = 0.5 * norm(size);
+  const double x = size.x * size.x, y = size.y * size.y, z = size.z * size.z;
+  body.inertia = mass / 12 * Matrix3{{{y + z, 0, 0}, {0, z + x, 0}, {0, 0, x + y}}};
+  body.inverse_inertia = inverse(body.inertia);
   return body;
 }
 
@@ -147,8 +139,8 @@ BodyProperties ball_body(double radius, double mass) {
   BodyProperties body;
   body.mass = mass;
   body.radius = radius;
-  body.inertia = 0.4 * mass * radius * radius * Eigen::Matrix3d::Identity();
-  body.inverse_inertia = body.inertia.inverse();
+  body.inertia = 0.4 * mass * radius * radius * Matrix3::identity();
+  body.inverse_inertia = inverse(body.inertia);
   return body;
 }
 
@@ -158,11 +150,11 @@ BodyProperties fixed_body() {
   return body;
 }
 
-std::unique_ptr<ContactFinder> boxes_on_plane(const Vector3d& normal, const Vector3d& size, double flicker) {
+std::unique_ptr<ContactFinder> boxes_on_plane(const Vector3& normal, const Vector3& size, double flicker) {
   return std::make_unique<BoxesOnPlane>(normal, size, flicker);
 }
 
-std::unique_ptr<ContactFinder> balls_on_plane(const Vector3d& normal, double radius) {
+std::unique_ptr<ContactFinder> balls_on_plane(const Vector3& normal, double radius) {
   return std::make_unique<BallsOnPlane>(normal, radius);
 }
 

@@ -10,10 +10,11 @@ namespace tandem::simulation {
 
 inline constexpr double kGravity = 9.81;
 /// The size of the boxes that most tests stack.
-inline const Eigen::Vector3d kCube = {1, 1, 1};
+inline constexpr Vector3 kCube = {1, 1, 1};
+inline constexpr Vector3 kUp = {0, 0, 1};
 
 /// A box of this mass with its centre at the origin of its frame.
-BodyProperties box_body(const Eigen::Vector3d& size, double mass);
+BodyProperties box_body(const Vector3& size, double mass);
 
 /// A solid ball of this mass with its centre at the origin of its frame.
 BodyProperties ball_body(double radius, double mass);
@@ -59,11 +60,10 @@ class AnalyticContacts : public ContactFinder {
 /// + 1 that lie below the top of box i, over its footprint in the frame of box i.
 ///
 /// The k-th time that contacts are found, they are deeper by k % 3 times `flicker`.
-std::unique_ptr<ContactFinder> boxes_on_plane(const Eigen::Vector3d& normal, const Eigen::Vector3d& size,
-                                              double flicker = 0);
+std::unique_ptr<ContactFinder> boxes_on_plane(const Vector3& normal, const Vector3& size, double flicker = 0);
 
 /// Body 0 is the half-space as above; the other bodies are balls. Each has one contact with it, at its foot.
-std::unique_ptr<ContactFinder> balls_on_plane(const Eigen::Vector3d& normal, double radius);
+std::unique_ptr<ContactFinder> balls_on_plane(const Vector3& normal, double radius);
 
 /// No contacts.
 std::unique_ptr<ContactFinder> no_contacts();

@@ -1,46 +1,43 @@
 #include <gtest/gtest.h>
-#include <tbb/global_control.h>
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 
 #include "analytic_contacts.h"
+#include "kernels/manifold/manifold_scene.h"
 
 namespace tandem::simulation {
 namespace {
 
-using Eigen::Vector3d;
-
 // Boxes on top of each other on the plane, each as deep in the next as the slop.
 std::vector<BodyState> tower(int boxes, double height, double slop) {
   std::vector<BodyState> states(static_cast<std::size_t>(boxes) + 1);
-  for (int i = 1; i <= boxes; ++i) states[i].position.z() = height * (i - 0.5) - slop * i;
+  for (int i = 1; i <= boxes; ++i) states[i].position.z = height * (i - 0.5) - slop * i;
   return states;
 }
 
-std::vector<BodyProperties> bodies_with(int boxes, const Vector3d& size) {
+std::vector<BodyProperties> bodies_with(int boxes, const Vector3& size) {
   std::vector<BodyProperties> bodies(static_cast<std::size_t>(boxes) + 1, box_body(size, 1));
   bodies[0] = fixed_body();
   return bodies;
 }
 
-SimulatorOptions options_of(SolverKind solver) {
+SimulatorOptions options_of(SolverMethod solver) {
   SimulatorOptions options;
-  options.solver.kind = solver;
+  options.solver.method = solver;
   return options;
 }
 
 // Tests of what holds whatever solves the steps.
-class EverySolver : public testing::TestWithParam<SolverKind> {};
+class EverySolver : public testing::TestWithParam<SolverMethod> {};
 
-std::string name_of(const testing::TestParamInfo<SolverKind>& tested) {
+std::string name_of(const testing::TestParamInfo<SolverMethod>& tested) {
   switch (tested.param) {
-    case SolverKind::automatic:
+    case SolverMethod::automatic:
       return "automatic";
-    case SolverKind::soft:
+    case SolverMethod::soft:
       return "soft";
-    case SolverKind::newton:
+    case SolverMethod::newton:
       return "newton";
     default:
       return "sweeps";
@@ -48,28 +45,28 @@ std::string name_of(const testing::TestParamInfo<SolverKind>& tested) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Solvers, EverySolver,
-                         testing::Values(SolverKind::automatic, SolverKind::soft, SolverKind::newton,
-                                         SolverKind::sweeps),
+                         testing::Values(SolverMethod::automatic, SolverMethod::soft, SolverMethod::newton,
+                                         SolverMethod::sweeps),
                          name_of);
 
 // A block on a slope that falls towards +x.
 struct Slope {
-  explicit Slope(double degrees) : angle(degrees * M_PI / 180), normal(std::sin(angle), 0, std::cos(angle)) {}
+  explicit Slope(double degrees) : angle(degrees * M_PI / 180), normal{std::sin(angle), 0, std::cos(angle)} {}
 
-  Vector3d downhill() const { return {std::cos(angle), 0, -std::sin(angle)}; }
+  Vector3 downhill() const { return {std::cos(angle), 0, -std::sin(angle)}; }
   BodyState resting(double height, double slop) const {
     BodyState state;
-    state.orientation = Eigen::Quaterniond(Eigen::AngleAxisd(angle, Vector3d::UnitY()));
+    state.orientation = rotation_by({0, angle, 0});
     state.position = (0.5 * height - slop) * normal;
     return state;
   }
 
   double angle;
-  Vector3d normal;
+  Vector3 normal;
 };
 
-Simulator block_on(const Slope& slope, const Vector3d& size, const SimulatorOptions& options) {
-  return Simulator(bodies_with(1, size), {BodyState(), slope.resting(size.z(), options.solver.slop)},
+Simulator block_on(const Slope& slope, const Vector3& size, const SimulatorOptions& options) {
+  return Simulator(bodies_with(1, size), {BodyState(), slope.resting(size.z, options.solver.slop)},
                    boxes_on_plane(slope.normal, size), options);
 }
 
@@ -78,30 +75,30 @@ TEST_P(EverySolver, ABlockSlidesAsTheClosedFormSays) {
     const Slope slope(degrees);
     SimulatorOptions options = options_of(GetParam());
     options.solver.friction = friction;
-    const Vector3d flat = {1, 1, 0.2};
+    const Vector3 flat = {1, 1, 0.2};
     Simulator simulator = block_on(slope, flat, options);
-    const Vector3d start = simulator.states()[1].position;
+    const Vector3 start = simulator.states()[1].position;
     constexpr int kSteps = 300;
     for (int i = 0; i < kSteps; ++i) simulator.step();
     const double time = kSteps * options.dt;
     const double acceleration = kGravity * (std::sin(slope.angle) - friction * std::cos(slope.angle));
     const BodyState& end = simulator.states()[1];
-    EXPECT_NEAR(end.velocity.dot(slope.downhill()) / (acceleration * time), 1, 1e-4);
-    EXPECT_NEAR((end.position - start).dot(slope.downhill()) / (0.5 * acceleration * time * time), 1, 0.01);
+    EXPECT_NEAR(dot(end.velocity, slope.downhill()) / (acceleration * time), 1, 1e-4);
+    EXPECT_NEAR(dot(end.position - start, slope.downhill()) / (0.5 * acceleration * time * time), 1, 0.01);
   }
 }
 
 TEST_P(EverySolver, ABlockSticksBelowTheAngleOfFrictionAndSlipsAbove) {
-  const Vector3d flat = {1, 1, 0.2};
+  const Vector3 flat = {1, 1, 0.2};
   for (const double friction : {0.2, 0.5, 0.8}) {
     const double limit = std::atan(friction) * 180 / M_PI;
     SimulatorOptions options = options_of(GetParam());
     options.solver.friction = friction;
     for (const double degrees : {0.99 * limit, 1.01 * limit}) {
       Simulator simulator = block_on(Slope(degrees), flat, options);
-      const Vector3d start = simulator.states()[1].position;
+      const Vector3 start = simulator.states()[1].position;
       for (int i = 0; i < 600; ++i) simulator.step();
-      const double moved = (simulator.states()[1].position - start).norm();
+      const double moved = norm(simulator.states()[1].position - start);
       if (degrees < limit) {
         EXPECT_LT(moved, 1e-4) << friction;
       } else {
@@ -113,12 +110,12 @@ TEST_P(EverySolver, ABlockSticksBelowTheAngleOfFrictionAndSlipsAbove) {
 
 TEST_P(EverySolver, ABlockGainsNoEnergyInAMinute) {
   SimulatorOptions options = options_of(GetParam());
-  Simulator simulator(bodies_with(1, kCube), tower(1, 1, options.solver.slop),
-                      boxes_on_plane(Vector3d::UnitZ(), kCube), options);
+  Simulator simulator(bodies_with(1, kCube), tower(1, 1, options.solver.slop), boxes_on_plane(kUp, kCube),
+                      options);
   const double start = simulator.step().potential_energy;
   for (int i = 1; i < 3600; ++i) {
     const StepRecord record = simulator.step();
-    ASSERT_LE(record.kinetic_energy, i < 60 && GetParam() == SolverKind::soft ? 1e-12 : 1e-18) << i;
+    ASSERT_LE(record.kinetic_energy, i < 60 && GetParam() == SolverMethod::soft ? 1e-12 : 1e-18) << i;
     ASSERT_LE(record.kinetic_energy + record.potential_energy, start + 1e-9);
   }
 }
@@ -126,32 +123,32 @@ TEST_P(EverySolver, ABlockGainsNoEnergyInAMinute) {
 TEST_P(EverySolver, AFallenBlockIsLiftedToTheSlopWithoutSpeed) {
   SimulatorOptions options = options_of(GetParam());
   std::vector<BodyState> states = tower(1, 1, 0);
-  states[1].position.z() += 0.5;
-  Simulator simulator(bodies_with(1, kCube), states, boxes_on_plane(Vector3d::UnitZ(), kCube), options);
+  states[1].position.z += 0.5;
+  Simulator simulator(bodies_with(1, kCube), states, boxes_on_plane(kUp, kCube), options);
   StepRecord record;
   double energy = 1e9;
   for (int i = 0; i < 600; ++i) {
     record = simulator.step();
     // Correction lifts, so potential energy may grow; speed must not.
     if (record.contacts > 0) {
-      ASSERT_LE(record.kinetic_energy, energy + (GetParam() == SolverKind::soft ? 1e-9 : 1e-12));
+      ASSERT_LE(record.kinetic_energy, energy + (GetParam() == SolverMethod::soft ? 1e-9 : 1e-12));
       energy = record.kinetic_energy;
     }
   }
   EXPECT_LE(record.kinetic_energy, 1e-18);
-  EXPECT_NEAR(record.penetration_max, options.solver.slop, GetParam() == SolverKind::soft ? 1e-5 : 1e-6);
+  EXPECT_NEAR(record.penetration_max, options.solver.slop, GetParam() == SolverMethod::soft ? 1e-5 : 1e-6);
 }
 
 TEST_P(EverySolver, RestitutionGivesTheSpeedBack) {
   SimulatorOptions options = options_of(GetParam());
   options.solver.restitution = 0.5;
   std::vector<BodyState> states = tower(1, 1, 0);
-  states[1].position.z() += 1e-9;
-  states[1].velocity.z() = -4;
-  options.gravity.setZero();
-  Simulator simulator(bodies_with(1, kCube), states, boxes_on_plane(Vector3d::UnitZ(), kCube), options);
+  states[1].position.z += 1e-9;
+  states[1].velocity.z = -4;
+  options.gravity = {};
+  Simulator simulator(bodies_with(1, kCube), states, boxes_on_plane(kUp, kCube), options);
   for (int i = 0; i < 2; ++i) simulator.step();
-  EXPECT_NEAR(simulator.states()[1].velocity.z(), 2, GetParam() == SolverKind::soft ? 1e-3 : 1e-9);
+  EXPECT_NEAR(simulator.states()[1].velocity.z, 2, GetParam() == SolverMethod::soft ? 1e-3 : 1e-9);
 }
 
 TEST(Resting, ATowerStands) {
@@ -159,14 +156,14 @@ TEST(Resting, ATowerStands) {
   for (const bool shock : {false, true}) {
     SCOPED_TRACE(shock ? "with shock propagation" : "without");
     SimulatorOptions options;
-    options.solver.kind = SolverKind::sweeps;
+    options.solver.method = SolverMethod::sweeps;
     options.solver.shock_propagation = shock;
     const auto start = tower(kBoxes, 1, options.solver.slop);
-    Simulator simulator(bodies_with(kBoxes, kCube), start, boxes_on_plane(Vector3d::UnitZ(), kCube), options);
+    Simulator simulator(bodies_with(kBoxes, kCube), start, boxes_on_plane(kUp, kCube), options);
     StepRecord record;
     for (int i = 0; i < 3600; ++i) record = simulator.step();
     for (int i = 1; i <= kBoxes; ++i) {
-      EXPECT_LT((simulator.states()[i].position - start[i].position).norm(), 0.01) << "box " << i;
+      EXPECT_LT(norm(simulator.states()[i].position - start[i].position), 0.01) << "box " << i;
     }
     EXPECT_LT(record.speed_max, 0.01);
   }
@@ -176,10 +173,10 @@ TEST(Resting, WarmStartLeavesASmallerResidual) {
   double residual[2];
   for (const bool warm : {false, true}) {
     SimulatorOptions options;
-    options.solver.kind = SolverKind::sweeps;
+    options.solver.method = SolverMethod::sweeps;
     options.solver.warm_start = warm;
-    Simulator simulator(bodies_with(10, kCube), tower(10, 1, options.solver.slop),
-                        boxes_on_plane(Vector3d::UnitZ(), kCube), options);
+    Simulator simulator(bodies_with(10, kCube), tower(10, 1, options.solver.slop), boxes_on_plane(kUp, kCube),
+                        options);
     for (int i = 0; i < 100; ++i) residual[warm] = simulator.step().residual_max;
   }
   EXPECT_LT(residual[1], 0.05 * residual[0]);
@@ -189,10 +186,10 @@ TEST(Resting, MoreIterationsLeaveASmallerResidual) {
   double last = 1e9;
   for (const std::uint32_t iterations : {5u, 20u, 80u}) {
     SimulatorOptions options;
-    options.solver.kind = SolverKind::sweeps;
+    options.solver.method = SolverMethod::sweeps;
     options.solver.iterations = iterations;
-    Simulator simulator(bodies_with(10, kCube), tower(10, 1, options.solver.slop),
-                        boxes_on_plane(Vector3d::UnitZ(), kCube), options);
+    Simulator simulator(bodies_with(10, kCube), tower(10, 1, options.solver.slop), boxes_on_plane(kUp, kCube),
+                        options);
     const double residual = simulator.step().residual_max;
     EXPECT_LT(residual, last);
     last = residual;
@@ -206,8 +203,7 @@ std::vector<BodyState> fallen_boxes(std::size_t count) {
     const double turn = static_cast<double>(i);
     states[i].position = {3.0 * static_cast<double>(i / 4), 0.05 * std::sin(turn),
                           0.6 + 1.2 * static_cast<double>(i % 4)};
-    states[i].orientation =
-        Eigen::Quaterniond(Eigen::AngleAxisd(0.02 * std::cos(turn), Vector3d(1, 2, 3).normalized()));
+    states[i].orientation = rotation_by(0.02 * std::cos(turn) * normalized(Vector3{1, 2, 3}));
   }
   return states;
 }
@@ -216,24 +212,12 @@ Simulator falling(std::uint32_t threads, const SimulatorOptions& common) {
   constexpr int kBoxes = 39;
   SimulatorOptions options = common;
   options.threads = threads;
-  return Simulator(bodies_with(kBoxes, kCube), fallen_boxes(kBoxes), boxes_on_plane(Vector3d::UnitZ(), kCube),
-                   options);
-}
-
-bool same_bytes(std::span<const BodyState> a, std::span<const BodyState> b) {
-  const auto same = [](const auto& x, const auto& y) {
-    return std::memcmp(x.data(), y.data(), sizeof x) == 0;
-  };
-  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [&](const BodyState& x, const BodyState& y) {
-    return same(x.position, y.position) && same(x.orientation.coeffs(), y.orientation.coeffs()) &&
-           same(x.velocity, y.velocity) && same(x.angular_velocity, y.angular_velocity);
-  });
+  return Simulator(bodies_with(kBoxes, kCube), fallen_boxes(kBoxes), boxes_on_plane(kUp, kCube), options);
 }
 
 TEST_P(EverySolver, ThreadsDoNotChangeABit) {
-  const tbb::global_control allowed(tbb::global_control::max_allowed_parallelism, 4);
   for (const ContactOrder order : {ContactOrder::found, ContactOrder::shuffled}) {
-    if (order == ContactOrder::shuffled && GetParam() != SolverKind::sweeps) continue;
+    if (order == ContactOrder::shuffled && GetParam() != SolverMethod::sweeps) continue;
     SimulatorOptions options = options_of(GetParam());
     options.solver.order = order;
     options.solver.shock_propagation = order == ContactOrder::found;
@@ -241,20 +225,20 @@ TEST_P(EverySolver, ThreadsDoNotChangeABit) {
     Simulator one = falling(1, options), four = falling(4, options);
     for (int i = 0; i < 200; ++i) {
       one.step(), four.step();
-      ASSERT_TRUE(same_bytes(one.states(), four.states())) << "step " << i;
+      ASSERT_TRUE(test::same_bytes(one.states(), four.states())) << "step " << i;
     }
   }
 }
 
 TEST(Determinism, TheSeedOfTheOrderMatters) {
   SimulatorOptions options;
-  options.solver.kind = SolverKind::sweeps;
+  options.solver.method = SolverMethod::sweeps;
   options.solver.order = ContactOrder::shuffled;
   Simulator first = falling(1, options);
   options.solver.seed = 2;
   Simulator second = falling(1, options);
   for (int i = 0; i < 100; ++i) first.step(), second.step();
-  EXPECT_FALSE(same_bytes(first.states(), second.states()));
+  EXPECT_FALSE(test::same_bytes(first.states(), second.states()));
 }
 
 TEST_P(EverySolver, ARestoredSimulatorGoesOnWithTheSameBytes) {
@@ -264,15 +248,15 @@ TEST_P(EverySolver, ARestoredSimulatorGoesOnWithTheSameBytes) {
   for (int i = 0; i < 90; ++i) whole.step();
   second.restore(whole.save());
   for (int i = 0; i < 90; ++i) whole.step(), second.step();
-  EXPECT_TRUE(same_bytes(whole.states(), second.states()));
+  EXPECT_TRUE(test::same_bytes(whole.states(), second.states()));
 }
 
 TEST_P(EverySolver, ATowerFallsAsleepAndATouchWakesIt) {
   SimulatorOptions options = options_of(GetParam());
   options.sleep.enabled = true;
   auto states = tower(3, 1, options.solver.slop);
-  states[3].position.z() += 20;
-  Simulator simulator(bodies_with(3, kCube), states, boxes_on_plane(Vector3d::UnitZ(), kCube), options);
+  states[3].position.z += 20;
+  Simulator simulator(bodies_with(3, kCube), states, boxes_on_plane(kUp, kCube), options);
   StepRecord record;
   for (int i = 0; i < 60; ++i) record = simulator.step();
   EXPECT_EQ(record.sleeping, 2u);
@@ -286,15 +270,15 @@ TEST_P(EverySolver, ATowerFallsAsleepAndATouchWakesIt) {
 constexpr double kRadius = 0.5, kMass = 3;
 
 // A ball on a plane that falls towards +x, for solvers that know rolling resistance.
-class Rolling : public testing::TestWithParam<SolverKind> {
+class Rolling : public testing::TestWithParam<SolverMethod> {
  protected:
-  Simulator ball(double slope, double resistance, const Vector3d& velocity = Vector3d::Zero(),
-                 const Vector3d& spin = Vector3d::Zero(), Motion plane = Motion::fixed,
-                 const Vector3d& plane_spin = Vector3d::Zero()) const {
+  Simulator ball(double slope, double resistance, const Vector3& velocity = Vector3{},
+                 const Vector3& spin = Vector3{}, Motion plane = Motion::fixed,
+                 const Vector3& plane_spin = Vector3{}) const {
     SimulatorOptions options;
-    options.solver.kind = GetParam();
+    options.solver.method = GetParam();
     options.solver.rolling_resistance = resistance;
-    const Vector3d normal = {std::sin(slope), 0, std::cos(slope)};
+    const Vector3 normal = {std::sin(slope), 0, std::cos(slope)};
     std::vector<BodyProperties> bodies = {fixed_body(), ball_body(kRadius, kMass)};
     bodies[0].motion = plane;
     std::vector<BodyState> states(2);
@@ -312,11 +296,11 @@ class Rolling : public testing::TestWithParam<SolverKind> {
 };
 
 INSTANTIATE_TEST_SUITE_P(Solvers, Rolling,
-                         testing::Values(SolverKind::automatic, SolverKind::soft, SolverKind::newton),
-                         [](const testing::TestParamInfo<SolverKind>& tested) -> std::string {
-                           return tested.param == SolverKind::automatic ? "automatic"
-                                  : tested.param == SolverKind::soft    ? "soft"
-                                                                        : "newton";
+                         testing::Values(SolverMethod::automatic, SolverMethod::soft, SolverMethod::newton),
+                         [](const testing::TestParamInfo<SolverMethod>& tested) -> std::string {
+                           return tested.param == SolverMethod::automatic ? "automatic"
+                                  : tested.param == SolverMethod::soft    ? "soft"
+                                                                          : "newton";
                          });
 
 TEST_P(Rolling, ABallRollsDownASlopeAsTheClosedFormSays) {
@@ -326,46 +310,46 @@ TEST_P(Rolling, ABallRollsDownASlopeAsTheClosedFormSays) {
       const BodyState& end = after(simulator, 3);
       const double speed =
           5.0 / 7 * kGravity * (std::sin(slope) - resistance / kRadius * std::cos(slope)) * 3;
-      EXPECT_NEAR(end.velocity.norm() / speed, 1, 1e-3) << slope << " " << resistance;
-      EXPECT_NEAR(end.angular_velocity.y() * kRadius / speed, 1, 1e-3) << slope << " " << resistance;
+      EXPECT_NEAR(norm(end.velocity) / speed, 1, 1e-3) << slope << " " << resistance;
+      EXPECT_NEAR(end.angular_velocity.y * kRadius / speed, 1, 1e-3) << slope << " " << resistance;
     }
   }
 }
 
 TEST_P(Rolling, ABallStaysOnASlopeThatIsNoSteeperThanItsLever) {
   Simulator held = ball(0.99 * std::atan(0.02 / kRadius), 0.02);
-  const Vector3d start = held.states()[1].position;
-  EXPECT_LT((after(held, 3).position - start).norm(), 1e-4);
+  const Vector3 start = held.states()[1].position;
+  EXPECT_LT(norm(after(held, 3).position - start), 1e-4);
   Simulator rolls = ball(1.05 * std::atan(0.02 / kRadius), 0.02);
-  EXPECT_GT((after(rolls, 3).position - start).norm(), 0.04);
+  EXPECT_GT(norm(after(rolls, 3).position - start), 0.04);
 }
 
 TEST_P(Rolling, ABallThatRollsOnAPlaneStopsWhereTheClosedFormSays) {
   constexpr double kSpeed = 1, kResistance = 0.05;
   const double way = 0.7 * kSpeed * kSpeed * kRadius / (kGravity * kResistance);
-  const Vector3d velocity = kSpeed * Vector3d(0.6, 0.8, 0);
-  Simulator simulator = ball(0, kResistance, velocity, Vector3d::UnitZ().cross(velocity) / kRadius);
+  const Vector3 velocity = kSpeed * Vector3{0.6, 0.8, 0};
+  Simulator simulator = ball(0, kResistance, velocity, cross(kUp, velocity) / kRadius);
   const BodyState& end = after(simulator, 3);
-  EXPECT_NEAR(end.position.head<2>().norm() / way, 1, 0.005);
-  EXPECT_NEAR(end.position.head<2>().normalized().dot(velocity.head<2>() / kSpeed), 1, 1e-6);
-  EXPECT_LT(end.velocity.norm(), 1e-5);
-  EXPECT_LT(end.angular_velocity.norm(), 1e-5);
+  const Vector3 rolled = {end.position.x, end.position.y, 0};
+  EXPECT_NEAR(norm(rolled) / way, 1, 0.005);
+  EXPECT_NEAR(dot(normalized(rolled), velocity / kSpeed), 1, 1e-6);
+  EXPECT_LT(norm(end.velocity), 1e-5);
+  EXPECT_LT(norm(end.angular_velocity), 1e-5);
 }
 
 TEST_P(Rolling, ABallThatSpinsOnTheSpotStopsAfterTheTimeOfTheClosedForm) {
   constexpr double kSpin = 4, kResistance = 0.02;
   const double time = kSpin * 0.4 * kRadius * kRadius / (kGravity * kResistance);
-  Simulator simulator = ball(0, kResistance, Vector3d::Zero(), kSpin * Vector3d::UnitZ());
-  EXPECT_NEAR(after(simulator, time / 2).angular_velocity.z() / kSpin, 0.5, 0.005);
-  EXPECT_LT(after(simulator, time / 2 + 0.1).angular_velocity.norm(), 1e-5);
+  Simulator simulator = ball(0, kResistance, Vector3{}, kSpin * kUp);
+  EXPECT_NEAR(after(simulator, time / 2).angular_velocity.z / kSpin, 0.5, 0.005);
+  EXPECT_LT(norm(after(simulator, time / 2 + 0.1).angular_velocity), 1e-5);
 }
 
 TEST_P(Rolling, ATableThatTurnsTakesABallAlong) {
   constexpr double kSpin = 0.3;
-  Simulator simulator =
-      ball(0, 0.02, Vector3d::Zero(), Vector3d::Zero(), Motion::kinematic, kSpin * Vector3d::UnitZ());
+  Simulator simulator = ball(0, 0.02, Vector3{}, Vector3{}, Motion::kinematic, kSpin * kUp);
   const BodyState& end = after(simulator, 2);
-  EXPECT_NEAR(end.angular_velocity.z(), kSpin, 1e-6);
+  EXPECT_NEAR(end.angular_velocity.z, kSpin, 1e-6);
 }
 
 }  // namespace

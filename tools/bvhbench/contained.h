@@ -5,7 +5,7 @@
 
 #include "bvhbench/engines/engine.h"
 #include "bvhbench/scenes/scene_file.h"
-#include "common/stopwatch.h"
+#include "kernels/common/stopwatch.h"
 #include "tandem/kernels/containment_query.h"
 
 namespace tandem::bench {

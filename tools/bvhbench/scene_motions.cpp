@@ -5,7 +5,7 @@
 
 #include "bvhbench/scenes/hdf5_file.h"
 #include "bvhbench/scenes/scene_motion.h"
-#include "bvhbench/simulator/mass_properties.h"
+#include "dynamics/mass_properties.h"
 
 namespace tandem::bench {
 namespace {
@@ -16,22 +16,22 @@ class MassCentres {
   explicit MassCentres(const LoadedScene& scene) : scene_(scene), centres_(scene.shapes.size()) {}
 
   // Returns the centre of mass of a shape, in the file's coordinates.
-  const Eigen::Vector3d& of(std::uint32_t shape) {
+  const dynamics::Vector3& of(std::uint32_t shape) {
     if (!centres_[shape]) centres_[shape] = compute(shape);
     return *centres_[shape];
   }
 
  private:
-  Eigen::Vector3d compute(std::uint32_t shape) const {
+  dynamics::Vector3 compute(std::uint32_t shape) const {
     try {
-      return simulation::mass_properties(scene_.assets[scene_.shapes[shape].asset].view()).properties.centre;
+      return dynamics::mass_properties(scene_.assets[scene_.shapes[shape].asset].view()).properties.centre;
     } catch (const std::runtime_error& impossible) {
       throw FileError(scene_.name_of(shape) + ": " + impossible.what());
     }
   }
 
   const LoadedScene& scene_;
-  std::vector<std::optional<Eigen::Vector3d>> centres_;
+  std::vector<std::optional<dynamics::Vector3>> centres_;
 };
 
 }  // namespace
@@ -51,8 +51,8 @@ std::vector<RigidMotion> motions_of(const std::string& path, const LoadedScene& 
     if (!told.centre.empty()) {
       std::copy_n(&told.centre[3 * i], 3, motion.centre);
     } else if (!told.angular_velocity.empty()) {
-      const Eigen::Vector3d& centre = centres.of(instances[i].asset);
-      apply(instances[i].pose, centre[0], centre[1], centre[2], motion.centre);
+      const dynamics::Vector3& centre = centres.of(instances[i].asset);
+      apply(instances[i].pose, centre.x, centre.y, centre.z, motion.centre);
     }
   }
   return all;

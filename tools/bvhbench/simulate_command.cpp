@@ -1,5 +1,3 @@
-#include <tbb/global_control.h>
-
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
@@ -28,10 +26,10 @@ struct SimulateArguments : CommonArguments {
   RunOptions run;
 };
 
-const std::map<std::string, SolverKind> kSolvers = {{"auto", SolverKind::automatic},
-                                                    {"soft", SolverKind::soft},
-                                                    {"newton", SolverKind::newton},
-                                                    {"sweeps", SolverKind::sweeps}};
+const std::map<std::string, SolverMethod> kSolvers = {{"auto", SolverMethod::automatic},
+                                                      {"soft", SolverMethod::soft},
+                                                      {"newton", SolverMethod::newton},
+                                                      {"sweeps", SolverMethod::sweeps}};
 
 const std::map<std::string, ContactOrder> kOrders = {{"found", ContactOrder::found},
                                                      {"shuffled", ContactOrder::shuffled}};
@@ -105,15 +103,15 @@ void set_up_scene(const SimulateArguments& arguments, Start& start) {
 // Returns the options that decide the results, for the file and for going on with it.
 Json options_of(const char* kind, const SimulateArguments& arguments, const Start& start) {
   const SimulatorOptions& simulator = arguments.simulator;
-  const SolverOptions& solver = simulator.solver;
+  const TestBedSolverOptions& solver = simulator.solver;
   return {{"configuration", kind},
-          {"start", hexadecimal(hash_of(start.bodies.bodies, start.bodies.states, start.scene))},
+          {"start", hexadecimal(simulation::hash_of(start.bodies.bodies, start.bodies.states, start.scene))},
           {"seed", arguments.seed},
           {"engine", arguments.engine},
           {"mode", arguments.fast ? "fast" : "exact"},
           {"points_per_patch", kMostManifoldPoints},
           {"dt", simulator.dt},
-          {"solver", name_of(solver.kind, kSolvers)},
+          {"solver", name_of(solver.method, kSolvers)},
           {"substeps", solver.substeps},
           {"gravity", arguments.gravity},
           {"iterations", solver.iterations},
@@ -152,14 +150,13 @@ double mean_of(const std::vector<StepRecord>& records, const Value& value) {
 }
 
 double collision_seconds(const StepRecord& record) {
-  return record.update_seconds + record.broad_phase_seconds + record.traversal_seconds +
-         record.triangle_test_seconds + record.transfer_seconds;
+  return record.update + record.broad_phase + record.traversal + record.triangle_tests + record.transfer;
 }
 
 Report report_of(const char* kind, const SimulateArguments& arguments, const RunDescription& run,
                  const RunResults& results) {
   const double collision = mean_of(results.records, collision_seconds);
-  const double contacts = mean_of(results.records, &StepRecord::contact_seconds);
+  const double contacts = mean_of(results.records, &StepRecord::generation);
   const double solver = mean_of(results.records, &StepRecord::solver_seconds);
   const StepRecord& last = results.records.back();
   Report report(18, 10);
@@ -218,23 +215,25 @@ ExitCode run(const char* kind, SimulateArguments arguments, const SetUp& set_up)
       arguments.rolling_resistance >= 0 ? arguments.rolling_resistance : 16 * options.solver.slop;
   options.solver.warm_start = !arguments.cold;
   options.solver.seed = arguments.seed;
-  if (options.solver.substeps == 0) options.solver.substeps = default_substeps(options.solver.kind);
+  if (options.solver.substeps == 0) options.solver.substeps = default_substeps(options.solver.method);
   const RunDescription description = describe(kind, arguments, start);
   if (is_done(arguments, description)) {
     std::printf("%s: is done\n", arguments.output.c_str());
     return kDone;
   }
-  const tbb::global_control threads(tbb::global_control::max_allowed_parallelism, options.threads);
   auto engine = make_engine(arguments.engine,
                             ContactOptions{.mode = arguments.fast ? QueryMode::fast : QueryMode::exact});
   engine->set_filter(start.filter);
+  std::unique_ptr<ContactsAhead> ahead;
+  if (options.solver.method != SolverMethod::sweeps)
+    ahead = std::make_unique<ContactsAhead>(start.shapes(), options.threads, start.filter);
   std::unique_ptr<ContinuousMotion> continuous;
   if (arguments.continuous)
     continuous = std::make_unique<ContinuousMotion>(start.shapes(), options.threads, start.filter);
   Simulator simulator(
       start.bodies.bodies, start.bodies.states,
       make_mesh_contact_finder(std::move(engine), start.shapes(), options.threads, arguments.ask_all),
-      options, std::move(continuous));
+      options, std::move(continuous), std::move(ahead));
   const RunResults results = run_simulation(simulator, description, start.reentry, arguments.run);
   print(arguments, report_of(kind, arguments, description, results));
   return kDone;
@@ -248,9 +247,9 @@ std::string engine_defect(const std::string& name) {
 
 void add_solver_options(Command command, SimulateArguments& arguments) {
   SimulatorOptions& simulator = arguments.simulator;
-  SolverOptions& solver = simulator.solver;
+  TestBedSolverOptions& solver = simulator.solver;
   command.add(
-      {{"--solver", solver.kind, kSolvers, "auto|soft|newton|sweeps [auto]",
+      {{"--solver", solver.method, kSolvers, "auto|soft|newton|sweeps [auto]",
         "how a step is solved: 'soft' or 'newton', 'auto' of these two, or 'sweeps'"},
        {"--dt", simulator.dt, "SECONDS [1/60]", "seconds of a step", between(1e-9, 1e3)},
        {"--substeps", solver.substeps, "N [16, with sweeps 1]", "parts of a step that share its contacts",

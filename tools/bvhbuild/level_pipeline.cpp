@@ -4,7 +4,7 @@
 
 #include "bvhbuild/levels/ladder.h"
 #include "bvhbuild/levels/self_contacts.h"
-#include "common/stopwatch.h"
+#include "kernels/common/stopwatch.h"
 
 namespace tandem::build {
 namespace {

@@ -11,7 +11,7 @@
 #include "common/number_words.h"
 #include "common/output_file.h"
 #include "common/printable.h"
-#include "common/stopwatch.h"
+#include "kernels/common/stopwatch.h"
 #include "level_pipeline.h"
 #include "parallel/parallel.h"
 #include "tandem/formats/hash.h"

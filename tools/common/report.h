@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "json.h"
-#include "stopwatch.h"
+#include "kernels/common/stopwatch.h"
 
 namespace tandem {
 

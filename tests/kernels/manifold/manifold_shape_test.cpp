@@ -565,7 +565,8 @@ TEST(SpringOnSpring, IsNoDeeperWhereATriangleIsMissingFarAway) {
     scene.bodies[1].pose = after(lean, turned);
     scene.find();
     for (const Manifold& m : scene.manifolds()) {
-      if ((m.flags & kOpenCurve) == 0) EXPECT_LT(m.depth, 0.005) << trial;
+      if ((m.flags & kOpenCurve) != 0) continue;
+      EXPECT_LT(m.depth, 0.005) << trial;
     }
   }
 }

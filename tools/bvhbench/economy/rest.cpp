@@ -19,7 +19,7 @@ void move_starts(const bench::LoadedScene& scene, double nudge, Preparation& sta
     const Vector direction = random_direction(random);
     if (start.bodies[i].motion != Motion::moving) continue;
     const double length = nudge * bounds_of(scene.view(start.bodies[i].shape)).diagonal();
-    start.states[i].position += length * Eigen::Vector3d(direction[0], direction[1], direction[2]);
+    start.states[i].position += length * Vector3{direction[0], direction[1], direction[2]};
   }
 }
 
@@ -31,7 +31,7 @@ Rest simulate(const std::string& path, const bench::LoadedScene& scene, const Si
   if (settings.nudge > 0) move_starts(scene, settings.nudge, start);
   SimulatorOptions options;
   options.threads = settings.threads;
-  options.solver.substeps = default_substeps(options.solver.kind);
+  options.solver.substeps = default_substeps(options.solver.method);
   options.solver.slop = default_slop(scene.assets[0].view());
   const std::vector<AssetView> shapes = scene.views();
   ExcludedPairTable excluded;
@@ -56,7 +56,7 @@ Rest simulate(const std::string& path, const bench::LoadedScene& scene, const Si
 Spread end_distance(const Rest& a, const Rest& b) {
   std::vector<double> distances;
   for (std::size_t i = 0; i < a.positions.size(); ++i)
-    distances.push_back((a.positions[i] - b.positions[i]).norm());
+    distances.push_back(norm(a.positions[i] - b.positions[i]));
   return spread_of(distances);
 }
 

@@ -1,11 +1,11 @@
 #pragma once
-#include <Eigen/Core>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "bvhbench/scenes/scene_file.h"
 #include "difference.h"
+#include "dynamics/linear.h"
 
 namespace tandem::economy {
 
@@ -20,9 +20,9 @@ struct SimulationSettings {
 
 /// The places where the moving bodies of a scene come to rest.
 struct Rest {
-  double step_seconds = 0;                 ///< of computing, mean over the steps
-  double speed = 0;                        ///< of the fastest body, mean over the last tenth of the steps
-  std::vector<Eigen::Vector3d> positions;  ///< of the centres of mass at the end
+  double step_seconds = 0;                   ///< of computing, mean over the steps
+  double speed = 0;                          ///< of the fastest body, mean over the last tenth of the steps
+  std::vector<dynamics::Vector3> positions;  ///< of the centres of mass at the end
 };
 
 /// Simulates a scene at its shapes' levels. Throws bench::FileError, and what the engine throws.

@@ -12,7 +12,7 @@
 #include <variant>
 #include <vector>
 
-#include "common/stopwatch.h"
+#include "kernels/common/stopwatch.h"
 #include "tandem/kernels/contact_query.h"
 #include "tandem/kernels/distance_query.h"
 #include "tandem/kernels/impact_query.h"

@@ -1,143 +1,90 @@
-#include "contacts.h"
-
 #include <algorithm>
-#include <cmath>
-#include <iterator>
-#include <new>
+#include <string>
+#include <vector>
 
-#include "common/stopwatch.h"
+#include "kernels/common/stopwatch.h"
+#include "simulator.h"
 
 namespace tandem::simulation {
 namespace {
-
-Eigen::Vector3d vector_of(const double (&x)[3]) {
-  return {x[0], x[1], x[2]};
-}
-
-void throw_unless_ok(Status status, const Scene& scene) {
-  if (status == Status::kOk) return;
-  if (status == Status::kOutOfMemory) throw std::bad_alloc();
-  const std::uint64_t where = scene.where();
-  const std::string blamed =
-      subject(status) != nullptr ? std::string(subject(status)) + " " + std::to_string(where) + ": " : "";
-  throw EngineError("contact manifolds: " + blamed + explain(status), status, where);
-}
 
 class MeshContactFinder : public ContactFinder {
  public:
   MeshContactFinder(std::unique_ptr<Engine> engine, std::span<const AssetView> shapes, std::uint32_t threads,
                     bool asks_all)
-      : engine_(std::move(engine)), threads_(threads), asks_all_(asks_all) {
+      : engine_(std::move(engine)), asks_all_(asks_all) {
     engine_->set_threads(threads);
     engine_->set_shapes(shapes);
-    generator_.set_shapes(shapes);
+    ask([&] {
+      require(scene_.set_assets(shapes), scene_);
+      require(scene_.set_threads(threads), scene_);
+    });
   }
 
   const std::vector<ContactPoint>& find(std::span<const BodyPose> bodies, std::span<const std::uint8_t> idle,
                                         const Keeping& keeping) override {
+    ask([&] { require(scene_.place(bodies), scene_); });
     engine_->find(bodies, idle, found_, [&](std::span<const ObjectPair> near) {
-      const std::span<const ObjectPair> moved = find_moved(near, bodies, keeping);
+      std::span<const ObjectPair> moved;
+      ask([&] { moved = find_moved(scene_, moved_, near, keeping); });
       return asks_all_ ? near : moved;
     });
     Stopwatch stopwatch;
-    const std::vector<ContactPoint>& points = generator_.generate(found_, bodies, kept_, threads_);
-    report_ = {engine_->times(), stopwatch.lap(), engine_->counters(), generator_.statistics(), kept_.size()};
-    return points;
+    ask([&] { make_points(); });
+    const EngineTimes& times = engine_->times();
+    report_.times = {times.update,         times.broad_phase, times.traversal,
+                     times.triangle_tests, times.transfer,    stopwatch.lap()};
+    report_.counters = engine_->counters();
+    report_.kept_pairs = kept_.size();
+    return points_;
   }
 
-  std::span<const PosedBodies> posed() const override { return generator_.posed(); }
-  void resume(std::span<const PosedBodies> posed) override { generator_.resume(posed); }
+  std::span<const PosedBodies> posed() const override { return moved_.posed(); }
+  void resume(std::span<const PosedBodies> posed) override {
+    ask([&] { require(moved_.resume(scene_, posed), scene_); });
+  }
 
  private:
-  // Remembered pairs may keep a gap, with which their boxes no longer meet.
-  std::span<const ObjectPair> find_moved(std::span<const ObjectPair> near, std::span<const BodyPose> bodies,
-                                         const Keeping& keeping) {
-    pairs_.clear();
-    std::ranges::set_union(near, keeping.remembered, std::back_inserter(pairs_));
-    const MovedQuery& moved = generator_.find_moved(pairs_, bodies, keeping.tolerance, threads_);
-    kept_.clear();
-    for (std::size_t i = 0; i < pairs_.size(); ++i) {
-      if (moved.kept_rows()[i] != kNoIndex) kept_.push_back(pairs_[i]);
+  template <typename Question>
+  static void ask(const Question& question) {
+    try {
+      question();
+    } catch (const QueryFailed& failed) {
+      throw error_of(failed, "contact manifolds");
     }
-    return moved.rows();
+  }
+
+  void make_points() {
+    is_kept_.clear(), contacts_.clear();
+    for (const ObjectPair& pair : found_.pairs)
+      is_kept_.push_back(std::binary_search(kept_.begin(), kept_.end(), pair));
+    for (const TriangleContact& c : found_.triangles) {
+      if (!is_kept_[c.pair]) contacts_.push_back({c.pair, c.triangle_a, c.triangle_b, 0, 0});
+    }
+    // The cache remembers by itself what a point did in the step before.
+    const ManifoldOptions options = {.match_previous = false};
+    require(manifolds_.find(scene_, found_.pairs, contacts_, options), scene_);
+    take_points(manifolds_, found_.pairs, points_, report_.contacts);
   }
 
   std::unique_ptr<Engine> engine_;
-  ContactGenerator generator_;
-  std::uint32_t threads_;
   bool asks_all_;
+  Scene scene_;
+  MovedQuery moved_;
+  ManifoldQuery manifolds_;
   ContactList found_;
-  std::vector<ObjectPair> pairs_;
+  std::vector<char> is_kept_;
+  std::vector<Contact> contacts_;
+  std::vector<ContactPoint> points_;
 };
 
 }  // namespace
 
-ContactAnchor anchor_of(const ContactPoint& contact, std::span<const BodyState> states) {
-  return {into_body(states[contact.body_a], contact.position),
-          into_body(states[contact.body_b], contact.position), contact.depth};
-}
-
-void carry(ContactPoint& contact, const ContactAnchor& anchor, std::span<const BodyState> states) {
-  const Eigen::Vector3d on_a = into_world(states[contact.body_a], anchor.in_a);
-  const Eigen::Vector3d on_b = into_world(states[contact.body_b], anchor.in_b);
-  contact.position = 0.5 * (on_a + on_b);
-  contact.depth = anchor.depth - contact.normal.dot(on_b - on_a);
-}
-
-Eigen::Vector3d across(const Eigen::Vector3d& normal) {
-  int smallest = 0;
-  normal.cwiseAbs().minCoeff(&smallest);
-  return normal.cross(Eigen::Vector3d::Unit(smallest)).normalized();
-}
-
-void ContactGenerator::set_shapes(std::span<const AssetView> shapes) {
-  throw_unless_ok(scene_.set_assets(shapes), scene_);
-}
-
-void ContactGenerator::place(std::span<const BodyPose> bodies, std::uint32_t threads) {
-  throw_unless_ok(scene_.set_threads(threads), scene_);
-  throw_unless_ok(scene_.place(bodies), scene_);
-}
-
-const MovedQuery& ContactGenerator::find_moved(std::span<const ObjectPair> pairs,
-                                               std::span<const BodyPose> bodies, double tolerance,
-                                               std::uint32_t threads) {
-  place(bodies, threads);
-  throw_unless_ok(moved_.find(scene_, pairs, {.tolerance = tolerance}), scene_);
-  return moved_;
-}
-
-void ContactGenerator::resume(std::span<const PosedBodies> posed) {
-  throw_unless_ok(moved_.resume(scene_, posed), scene_);
-}
-
-const std::vector<ContactPoint>& ContactGenerator::generate(const ContactList& found,
-                                                            std::span<const BodyPose> bodies,
-                                                            std::span<const ObjectPair> left_out,
-                                                            std::uint32_t threads) {
-  contacts_.clear();
-  std::vector<char> is_left_out;
-  for (const ObjectPair& pair : found.pairs)
-    is_left_out.push_back(std::binary_search(left_out.begin(), left_out.end(), pair));
-  for (const TriangleContact& c : found.triangles) {
-    if (!is_left_out[c.pair]) contacts_.push_back({c.pair, c.triangle_a, c.triangle_b, 0, 0});
-  }
-  // The solvers remember by themselves what a point did in the step before.
-  const ManifoldOptions options = {.match_previous = false};
-  place(bodies, threads);
-  throw_unless_ok(manifolds_.find(scene_, found.pairs, contacts_, options), scene_);
-  points_.clear();
-  statistics_ = {manifolds_.counters(), 0, 0};
-  for (const Manifold& manifold : manifolds_.rows()) {
-    const ObjectPair& pair = found.pairs[manifold.pair];
-    const Eigen::Vector3d normal = vector_of(manifold.normal);
-    statistics_.area += std::fabs(vector_of(manifold.area_vector).dot(normal));
-    statistics_.depth = std::max(statistics_.depth, manifold.depth);
-    for (const ManifoldPoint& p : manifolds_.points().subspan(manifold.first_point, manifold.point_count)) {
-      points_.push_back({pair.a, pair.b, vector_of(p.position), normal, p.depth, p.id});
-    }
-  }
-  return points_;
+EngineError error_of(const QueryFailed& failed, const char* question) {
+  const char* blamed = subject(failed.status);
+  const std::string who =
+      blamed != nullptr ? std::string(blamed) + " " + std::to_string(failed.where) + ": " : "";
+  return {std::string(question) + ": " + who + explain(failed.status), failed.status, failed.where};
 }
 
 std::unique_ptr<ContactFinder> make_mesh_contact_finder(std::unique_ptr<Engine> engine,

@@ -70,21 +70,6 @@ bool spread(const Lattice& lattice, Scene& scene, Random& random, std::vector<In
 }
 
 using bench::FileError;
-using Eigen::Vector3d;
-
-// The distance of the farthest vertex.
-double radius_about(const Vector3d& centre, const AssetView& shape) {
-  const LevelView level = shape.level();
-  double squared = 0;
-  for (const Triangle& triangle : std::span(level.triangles, level.triangle_count)) {
-    for (const Triangle::Corner& corner : triangle.corner) {
-      Vector3d at;
-      for (int k = 0; k < 3; ++k) at[k] = corner.position[k] + shape.header->origin[k];
-      squared = std::max(squared, (at - centre).squaredNorm());
-    }
-  }
-  return std::sqrt(squared);
-}
 
 // Bodies of each shape, of density 1. Their mass is that of `finest`, the shapes' assets from level 0 on: a
 // coarser level changes what a body touches, not what it weighs.
@@ -108,8 +93,8 @@ class Shapes {
     BodyProperties body = *of_dynamic_[shape];
     body.motion = motion;
     body.mass *= density;
-    body.inertia *= density;
-    body.inverse_inertia /= density;
+    body.inertia = density * body.inertia;
+    body.inverse_inertia = (1 / density) * body.inverse_inertia;
     return body;
   }
 
@@ -253,8 +238,8 @@ Preparation prepare_scene(const std::string& path, const bench::LoadedScene& sce
     const double body_density = motion.density.empty() ? density : motion.density[i];
     add_body(all, bodies.body(shape, mover, body_density, all.findings), instances[i].pose, shapes[shape]);
     const auto vector_of = [i](const std::vector<double>& numbers) {
-      return numbers.empty() ? Vector3d(Vector3d::Zero())
-                             : Vector3d(numbers[3 * i], numbers[3 * i + 1], numbers[3 * i + 2]);
+      return numbers.empty() ? Vector3(Vector3{})
+                             : Vector3(numbers[3 * i], numbers[3 * i + 1], numbers[3 * i + 2]);
     };
     if (mover == Motion::fixed) continue;
     all.states.back().velocity = vector_of(motion.velocity);
@@ -275,10 +260,11 @@ std::uint64_t hash_of(std::span<const BodyProperties> bodies, std::span<const Bo
     numbers.push_back(static_cast<double>(bodies[i].shape));
     numbers.push_back(static_cast<double>(bodies[i].motion));
     numbers.push_back(bodies[i].mass);
-    for (const Vector3d& vector : {state.position, state.velocity, state.angular_velocity}) {
-      numbers.insert(numbers.end(), vector.data(), vector.data() + 3);
+    for (const Vector3& vector : {state.position, state.velocity, state.angular_velocity}) {
+      numbers.insert(numbers.end(), {vector.x, vector.y, vector.z});
     }
-    numbers.insert(numbers.end(), state.orientation.coeffs().data(), state.orientation.coeffs().data() + 4);
+    const Quaternion& turn = state.orientation;
+    numbers.insert(numbers.end(), {turn.x, turn.y, turn.z, turn.w});
   }
   std::uint64_t hash = xxh64(numbers.data(), numbers.size() * sizeof(double));
   for (const auto& [asset, level] : scene.shapes) {

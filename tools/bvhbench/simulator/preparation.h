@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "bvhbench/scenes/scene_file.h"
-#include "rigid_body.h"
+#include "simulator.h"
 #include "tandem/formats/view.h"
 
 /// The configurations of the paper's test-bed, as they are before the first step. The same arguments give the

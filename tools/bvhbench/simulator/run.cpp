@@ -16,15 +16,13 @@
 namespace tandem::simulation {
 namespace {
 
-using Eigen::Vector3d;
-
-bool is_free(const Simulator& simulator, std::uint32_t body, const Vector3d& position) {
+bool is_free(const Simulator& simulator, std::uint32_t body, const Vector3& position) {
   const auto bodies = simulator.bodies();
   const auto states = simulator.states();
   for (std::uint32_t i = 0; i < bodies.size(); ++i) {
     if (i == body || bodies[i].motion != Motion::moving) continue;
     const double reach = bodies[i].radius + bodies[body].radius;
-    if ((states[i].position - position).squaredNorm() < reach * reach) return false;
+    if (square(states[i].position - position) < reach * reach) return false;
   }
   return true;
 }
@@ -130,9 +128,11 @@ class Checkpoints {
 // Refuses a state that no further step can start from, such as that of a body whose speed has overflowed.
 void check_states(const Simulator& simulator, const std::string& output, std::uint32_t step) {
   const auto is_usable = [](const BodyState& state) {
-    return state.position.cwiseAbs().maxCoeff<Eigen::PropagateNaN>() <= kLargestWorldCoordinate &&
-           state.orientation.coeffs().allFinite() && state.velocity.allFinite() &&
-           state.angular_velocity.allFinite();
+    const auto& [x, y, z] = state.position;
+    const double bound = kLargestWorldCoordinate;
+    return std::fabs(x) <= bound && std::fabs(y) <= bound && std::fabs(z) <= bound &&
+           std::isfinite(state.orientation.w) && is_finite(state.velocity) &&
+           is_finite(state.angular_velocity);
   };
   const auto states = simulator.states();
   const auto lost = std::find_if_not(states.begin(), states.end(), is_usable);
@@ -170,26 +170,26 @@ RunResults start(Simulator& simulator, const RunDescription& run, const RunOptio
 }  // namespace
 
 Reentry::Reentry(const AssetView& sheet, std::span<const Instance> grounds, double tilt, std::uint64_t seed)
-    : lower_(Vector3d::Constant(HUGE_VAL)), upper_(Vector3d::Constant(-HUGE_VAL)), seed_(seed) {
+    : lower_{HUGE_VAL, HUGE_VAL, HUGE_VAL}, upper_(-lower_), seed_(seed) {
   const double angle = tilt * M_PI / 180;
-  frame_ = Eigen::AngleAxisd(angle, Vector3d::UnitY()).toRotationMatrix();
+  frame_ = matrix_of(rotation_by({0, angle, 0}));
   const Bounds bounds = bounds_of(sheet);
   for (const Instance& ground : grounds) {
     for (int corner = 0; corner < 8; ++corner) {
-      Vector3d world;
+      double world[3];
       const auto end = [&](int k) { return corner >> k & 1 ? bounds.upper[k] : bounds.lower[k]; };
-      tandem::apply(ground.pose, end(0), end(1), end(2), world.data());
-      lower_ = lower_.cwiseMin(frame_.transpose() * world);
-      upper_ = upper_.cwiseMax(frame_.transpose() * world);
+      tandem::apply(ground.pose, end(0), end(1), end(2), world);
+      const Vector3 seen = transposed(frame_) * vector_of(world);
+      lower_ = {std::min(lower_.x, seen.x), std::min(lower_.y, seen.y), std::min(lower_.z, seen.z)};
+      upper_ = {std::max(upper_.x, seen.x), std::max(upper_.y, seen.y), std::max(upper_.z, seen.z)};
     }
   }
 }
 
-bool Reentry::has_left(const Vector3d& position, double radius) const {
-  const Vector3d seen = frame_.transpose() * position;
-  const bool beside =
-      seen.x() > upper_.x() || seen.x() < lower_.x() || seen.y() > upper_.y() || seen.y() < lower_.y();
-  return beside || seen.z() < lower_.z() - radius;
+bool Reentry::has_left(const Vector3& position, double radius) const {
+  const Vector3 seen = transposed(frame_) * position;
+  const bool beside = seen.x > upper_.x || seen.x < lower_.x || seen.y > upper_.y || seen.y < lower_.y;
+  return beside || seen.z < lower_.z - radius;
 }
 
 BodyState Reentry::entry(const Simulator& simulator, std::uint32_t body, std::uint64_t step) const {
@@ -198,16 +198,16 @@ BodyState Reentry::entry(const Simulator& simulator, std::uint32_t body, std::ui
   Random random(seed_ * 0x9E3779B97F4A7C15u + step * 0xC2B2AE3D27D4EB4Fu + body);
   BodyState state;
   const Rotation turned = random_rotation(random);
-  Eigen::Matrix3d rotation;
+  double rotation[3][3];
   for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) rotation(i, j) = turned[i][j];
+    for (int j = 0; j < 3; ++j) rotation[i][j] = turned[i][j];
   }
-  state.orientation = Eigen::Quaterniond(rotation).normalized();
-  for (double height = upper_.z() + radius;; height += radius) {
+  state.orientation = quaternion_of(rotation);
+  for (double height = upper_.z + radius;; height += radius) {
     for (int i = 0; i < kTriesAtAHeight; ++i) {
-      const double along = lower_.x() + random.between(radius, 3 * radius);
-      const double across = random.between(lower_.y() + radius, upper_.y() - radius);
-      state.position = frame_ * Vector3d(along, across, height);
+      const double along = lower_.x + random.between(radius, 3 * radius);
+      const double across = random.between(lower_.y + radius, upper_.y - radius);
+      state.position = frame_ * Vector3{along, across, height};
       if (is_free(simulator, body, state.position)) return state;
     }
   }

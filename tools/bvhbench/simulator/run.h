@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "run_file.h"
-#include "simulator.h"
 #include "tandem/formats/view.h"
 
 namespace tandem::simulation {
@@ -23,11 +22,11 @@ class Reentry {
   std::uint64_t apply(Simulator& simulator, std::uint64_t step) const;
 
  private:
-  bool has_left(const Eigen::Vector3d& position, double radius) const;
+  bool has_left(const Vector3& position, double radius) const;
   BodyState entry(const Simulator& simulator, std::uint32_t body, std::uint64_t step) const;
 
-  Eigen::Matrix3d frame_;          // columns: downhill, across, up from the ground
-  Eigen::Vector3d lower_, upper_;  // of the ground, in that frame
+  Matrix3 frame_;          // columns: downhill, across, up from the ground
+  Vector3 lower_, upper_;  // of the ground, in that frame
   std::uint64_t seed_;
 };
 

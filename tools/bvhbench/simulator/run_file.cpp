@@ -11,25 +11,25 @@
 namespace tandem::bench {
 
 template <>
-struct Stored<Eigen::Vector3d> {
+struct Stored<dynamics::Vector3> {
   using Number = double;
   static constexpr std::size_t kWidth = 3;
-  static void append(std::vector<double>& numbers, const Eigen::Vector3d& vector) {
-    numbers.insert(numbers.end(), vector.data(), vector.data() + 3);
+  static void append(std::vector<double>& numbers, const dynamics::Vector3& vector) {
+    numbers.insert(numbers.end(), {vector.x, vector.y, vector.z});
   }
-  static Eigen::Vector3d at(const std::vector<double>& numbers, std::size_t i) {
-    return Eigen::Vector3d(&numbers[3 * i]);
+  static dynamics::Vector3 at(const std::vector<double>& numbers, std::size_t i) {
+    return {numbers[3 * i], numbers[3 * i + 1], numbers[3 * i + 2]};
   }
 };
 
 template <>
-struct Stored<Eigen::Quaterniond> {
+struct Stored<dynamics::Quaternion> {
   using Number = double;
   static constexpr std::size_t kWidth = 4;
-  static void append(std::vector<double>& numbers, const Eigen::Quaterniond& turn) {
-    numbers.insert(numbers.end(), {turn.w(), turn.x(), turn.y(), turn.z()});
+  static void append(std::vector<double>& numbers, const dynamics::Quaternion& turn) {
+    numbers.insert(numbers.end(), {turn.w, turn.x, turn.y, turn.z});
   }
-  static Eigen::Quaterniond at(const std::vector<double>& numbers, std::size_t i) {
+  static dynamics::Quaternion at(const std::vector<double>& numbers, std::size_t i) {
     return {numbers[4 * i], numbers[4 * i + 1], numbers[4 * i + 2], numbers[4 * i + 3]};
   }
 };
@@ -61,19 +61,17 @@ using bench::FileError;
 using bench::Hdf5Input;
 using bench::Hdf5Output;
 using bench::Stored;
-using Eigen::Quaterniond;
-using Eigen::Vector3d;
 
 // The datasets of a kind of row: calls visit(name, member) for each, one row for each element.
 template <typename Visit>
 void for_each_column(const StepRecord&, const Visit& visit) {
   visit("/frames/time", &StepRecord::time);
-  visit("/frames/seconds/update", &StepRecord::update_seconds);
-  visit("/frames/seconds/broad_phase", &StepRecord::broad_phase_seconds);
-  visit("/frames/seconds/traversal", &StepRecord::traversal_seconds);
-  visit("/frames/seconds/triangle_tests", &StepRecord::triangle_test_seconds);
-  visit("/frames/seconds/transfer", &StepRecord::transfer_seconds);
-  visit("/frames/seconds/contacts", &StepRecord::contact_seconds);
+  visit("/frames/seconds/update", &StepRecord::update);
+  visit("/frames/seconds/broad_phase", &StepRecord::broad_phase);
+  visit("/frames/seconds/traversal", &StepRecord::traversal);
+  visit("/frames/seconds/triangle_tests", &StepRecord::triangle_tests);
+  visit("/frames/seconds/transfer", &StepRecord::transfer);
+  visit("/frames/seconds/contacts", &StepRecord::generation);
   visit("/frames/seconds/solver", &StepRecord::solver_seconds);
   visit("/frames/seconds/step", &StepRecord::step_seconds);
   visit("/frames/object_pairs", &StepRecord::object_pairs);
@@ -191,7 +189,7 @@ void write_bodies(Hdf5Output& file, const RunDescription& run) {
   add_column(file, "/bodies/centre_of_mass", bodies, &BodyProperties::centre);
   std::vector<double> inertia;
   for (const BodyProperties& body : bodies)
-    inertia.insert(inertia.end(), body.inertia.data(), body.inertia.data() + 9);  // symmetric
+    for (const Vector3& row : body.inertia.row) Stored<Vector3>::append(inertia, row);
   file.add("/bodies/inertia", {bodies.size(), 3, 3}, inertia);
 }
 
@@ -215,7 +213,7 @@ Trajectory read_trajectory(const Hdf5Input& file, const std::string& path, std::
   return trajectory;
 }
 
-void write_state(Hdf5Output& file, const SimulatorState& state) {
+void write_state(Hdf5Output& file, const SimulationState& state) {
   const std::size_t bodies = state.states.size();
   const std::vector<std::uint64_t> step = {state.step};
   file.add("/state/step", {1}, step);
@@ -226,8 +224,8 @@ void write_state(Hdf5Output& file, const SimulatorState& state) {
   write_rows(file, std::span(state.posed));
 }
 
-SimulatorState read_state(const Hdf5Input& file, const std::string& path, std::size_t bodies) {
-  SimulatorState state;
+SimulationState read_state(const Hdf5Input& file, const std::string& path, std::size_t bodies) {
+  SimulationState state;
   const bool alike = read_rows(file, state.states);
   const auto step = file.read_u64("/state/step");
   state.quiet = file.read_f64("/state/quiet_seconds");
@@ -283,8 +281,8 @@ void Trajectory::keep(std::uint32_t step, std::span<const BodyState> states) {
   if (every == 0 || step % every != 0) return;
   frame.push_back(step);
   for (const BodyState& state : states)
-    Stored<Vector3d>::append(position, state.position),
-        Stored<Quaterniond>::append(orientation, state.orientation);
+    Stored<Vector3>::append(position, state.position),
+        Stored<Quaternion>::append(orientation, state.orientation);
 }
 
 void write_run(const std::string& path, const RunDescription& run, const RunResults& results) {
@@ -346,10 +344,10 @@ StoredFrame read_frame(const std::string& path, std::uint32_t frame) {
     const std::size_t at = static_cast<std::size_t>(found - kept.begin()) * shape.size() + i;
     BodyProperties body;
     body.shape = shape[i];
-    body.centre = Stored<Vector3d>::at(centre, i);
+    body.centre = Stored<Vector3>::at(centre, i);
     BodyState state;
-    state.position = Stored<Vector3d>::at(trajectory.position, at);
-    state.orientation = Stored<Quaterniond>::at(trajectory.orientation, at);
+    state.position = Stored<Vector3>::at(trajectory.position, at);
+    state.orientation = Stored<Quaternion>::at(trajectory.orientation, at);
     stored.poses.push_back(pose_of(body, state));
   }
   return stored;

@@ -23,7 +23,7 @@ struct Trajectory {
 struct RunResults {
   std::vector<StepRecord> records;
   Trajectory trajectory;
-  SimulatorState state;
+  SimulationState state;
 };
 
 /// The description of a run, apart from its results.

@@ -1,108 +1,77 @@
 #pragma once
-#include <tbb/task_arena.h>
-#include <Eigen/Core>
-
 #include <cstdint>
 #include <memory>
-#include <span>
 #include <vector>
 
-#include "contact_cache.h"
-#include "continuous_motion.h"
-#include "step_solver.h"
+#include "bvhbench/engines/engine.h"
+#include "dynamics/continuous_motion.h"
+#include "dynamics/simulation.h"
 
+/// The test-bed: the library's simulation with any engine's contacts, and with the literature's sweeps.
 namespace tandem::simulation {
 
-/// The record of what a step found and did. The contacts are those of the state before the step; energies,
-/// momenta and speeds are those of the state after it, over all dynamic bodies.
-struct StepRecord {
-  double time = 0;  ///< at the end of the step
+using namespace dynamics;
 
-  // Seconds that the phases took.
-  double update_seconds = 0, broad_phase_seconds = 0, traversal_seconds = 0, triangle_test_seconds = 0,
-         transfer_seconds = 0, contact_seconds = 0, solver_seconds = 0, step_seconds = 0;
-
-  std::uint64_t object_pairs = 0, kept_pairs = 0, block_pairs = 0, candidates = 0, triangle_pairs = 0;
-  std::uint64_t segments = 0, patches = 0, open_curves = 0, contacts = 0;
-  std::uint64_t islands = 0, newton_islands = 0, sleeping = 0, reentered = 0;
-
-  double contact_ratio =
-      0;  ///< pairs of triangles that meet, by the triangles of dynamic bodies: the paper's Figure 6
-  double contact_area = 0;
-  double penetration_max = 0, penetration_mean = 0;  ///< over the contacts
-  double residual_max = 0, residual_rms = 0;         ///< SolverStatistics
-
-  double kinetic_energy = 0, potential_energy = 0;  ///< potential: 0 at the world's origin
-  Eigen::Vector3d linear_momentum = Eigen::Vector3d::Zero(), angular_momentum = Eigen::Vector3d::Zero();
-  double speed_max = 0, speed_mean = 0;  ///< of centres of mass
-  double spin_max = 0;                   ///< of the fastest point about its body's centre
+/// Says how a step is solved.
+enum class SolverMethod : std::uint8_t {
+  automatic,  ///< as SolverKind
+  soft,
+  newton,
+  sweeps,  ///< projected Gauss-Seidel
 };
 
-struct SimulatorOptions {
-  double dt = 1.0 / 60;
-  Eigen::Vector3d gravity = {0, 0, -9.81};
-  SolverOptions solver;
-  SleepOptions sleep;
-  std::uint32_t threads = 1;  ///< at most; oneTBB starts no more than its max_allowed_parallelism
+/// Says in which order sweeps visit contacts.
+enum class ContactOrder : std::uint8_t {
+  found,     ///< by ascending pair of bodies, sweeps forwards and backwards in turn
+  shuffled,  ///< anew in each step, from the seed
 };
 
-/// The state has all that the next steps depend on, beside bodies and options.
-struct SimulatorState {
-  std::uint64_t step = 0;
-  std::vector<BodyState> states;
-  std::vector<CachedContact> contacts;
-  std::vector<PosedBodies> posed;     ///< of the contact finder
-  std::vector<double> quiet;          ///< of Sleep
-  std::vector<std::uint32_t> groups;  ///< of Sleep
+/// Those of the library; rolling resistance is not of sweeps.
+struct TestBedSolverOptions : dynamics::SolverOptions {
+  SolverMethod method = SolverMethod::automatic;
+
+  // These are for sweeps alone.
+  std::uint32_t iterations = 30;           ///< sweeps over the contacts for velocities, at most
+  std::uint32_t position_iterations = 30;  ///< the same for the correction of penetration
+  ContactOrder order = ContactOrder::found;
+  std::uint64_t seed = 1;
+  bool shock_propagation = false;
+
+  TestBedSolverOptions() { substeps = 0; }  ///< 0: default_substeps()
 };
 
-/// Moves rigid bodies, step by step: contacts where the bodies stand, velocities with gravity, contacts
-/// solved for, positions by the new velocities (semi-implicit Euler). Bodies that have moved against each
-/// other by no more than the slop keep their contacts. With warm start, a step that has no impulse of the
-/// step before makes ten times the sweeps. The bytes are the same for any number of threads.
-class Simulator {
+/// The parts of a step where options say nothing: 1 for sweeps, 16 for the others.
+std::uint32_t default_substeps(SolverMethod method);
+
+struct SimulatorOptions : SimulationOptions {
+  TestBedSolverOptions solver;  ///< in place of the library's
+};
+
+/// The solver of a method.
+std::unique_ptr<StepSolver> make_solver(const TestBedSolverOptions& options);
+
+/// The solver of SolverMethod::sweeps.
+std::unique_ptr<StepSolver> make_sweep_solver(const TestBedSolverOptions& options);
+
+/// The library's simulation with the test-bed's solvers. With warm start, sweeps make ten times as many in a
+/// step that has no impulse of the step before.
+class Simulator : public Simulation {
  public:
-  /// continuous: what keeps fast bodies from passing through others; null: nothing does. Condition: as many
-  /// states as bodies.
+  /// Conditions: as of Simulation.
   Simulator(std::vector<BodyProperties> bodies, std::vector<BodyState> states,
             std::unique_ptr<ContactFinder> contacts, const SimulatorOptions& options,
-            std::unique_ptr<ContinuousMotion> continuous = nullptr);
-
-  /// Throws what the contact finder throws.
-  StepRecord step();
-
-  std::span<const BodyProperties> bodies() const { return bodies_; }
-  std::span<const BodyState> states() const { return states_; }
-  std::vector<BodyPose> poses() const;
-
-  /// Puts a body somewhere else, awake.
-  void place(std::uint32_t body, const BodyState& state);
-
-  SimulatorState save() const;
-
-  /// Goes on where save() was called. Condition: of a simulator of the same bodies and options.
-  void restore(SimulatorState state);
-
- private:
-  StepRecord step_in_arena();
-  void find_contacts(StepRecord& record);
-  void solve(StepRecord& record);
-  void sleep();
-  void update_acting();
-  std::vector<std::uint8_t> idle() const;
-  void take_measures(StepRecord& record) const;
-
-  std::vector<BodyProperties> bodies_, acting_;  // acting_: what sleeps is fixed
-  std::vector<BodyState> states_;
-  std::unique_ptr<ContactFinder> finder_;
-  std::unique_ptr<ContinuousMotion> continuous_;
-  SimulatorOptions options_;
-  tbb::task_arena arena_;
-  Islands islands_;
-  std::unique_ptr<StepSolver> solver_;
-  ContactCache cache_;
-  Sleep sleep_;
-  std::uint64_t step_ = 0;
+            std::unique_ptr<ContinuousMotion> continuous = nullptr,
+            std::unique_ptr<ContactsAhead> ahead = nullptr);
 };
+
+/// Contacts of meshes: a collision engine finds the triangles that meet, and points are made of them. What
+/// the shapes look at must outlive it. asks_all: the engine is asked about pairs that are kept too, so that
+/// its times and counters are of all pairs. Throws EngineError.
+std::unique_ptr<ContactFinder> make_mesh_contact_finder(std::unique_ptr<Engine> engine,
+                                                        std::span<const AssetView> shapes,
+                                                        std::uint32_t threads, bool asks_all = false);
+
+/// An engine's error of a failed question.
+EngineError error_of(const QueryFailed& failed, const char* question);
 
 }  // namespace tandem::simulation

@@ -1,34 +1,28 @@
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "common/random_pose.h"
-#include "step_solver.h"
+#include "simulator.h"
 
 namespace tandem::simulation {
 
 namespace {
 
-using Eigen::Matrix3d;
-using Eigen::Vector3d;
-
 struct Velocities {
-  Vector3d velocity = Vector3d::Zero(), spin = Vector3d::Zero();
+  Vector3 velocity = Vector3{}, spin = Vector3{};
 };
 
 // A body while contacts are solved.
 struct Mover : Velocities {
   double inverse_mass;
-  Matrix3d inverse_inertia;  // in the world
+  Matrix3 inverse_inertia;  // in the world
 };
 
 // A direction of a contact: w = direction . (v_b - v_a) + arm_b . spin_b - arm_a . spin_a.
 struct Row {
-  Vector3d direction, arm_a, arm_b;
-  Vector3d turn_a, turn_b;        // what an impulse of 1 adds to the spins, less the sign of a
+  Vector3 direction, arm_a, arm_b;
+  Vector3 turn_a, turn_b;         // what an impulse of 1 adds to the spins, less the sign of a
   double mobility_a, mobility_b;  // what it adds to w through either body
   double impulse;
 };
@@ -48,7 +42,7 @@ struct Held {
 };
 
 double relative_velocity(const Row& row, const Velocities& a, const Velocities& b) {
-  return row.direction.dot(b.velocity - a.velocity) + row.arm_b.dot(b.spin) - row.arm_a.dot(a.spin);
+  return dot(row.direction, b.velocity - a.velocity) + dot(row.arm_b, b.spin) - dot(row.arm_a, a.spin);
 }
 
 void push_apart(const Joint& joint, const Row& row, double impulse, Velocities& a, Velocities& b,
@@ -121,38 +115,39 @@ double visit_correction(Joint& joint, std::vector<Velocities>& corrections, cons
   return std::fabs(change) * moves;
 }
 
-Row make_row(const Vector3d& direction, const Vector3d& from_a, const Vector3d& from_b, const Mover& a,
+Row make_row(const Vector3& direction, const Vector3& from_a, const Vector3& from_b, const Mover& a,
              const Mover& b) {
   Row row;
   row.direction = direction;
-  row.arm_a = from_a.cross(direction);
-  row.arm_b = from_b.cross(direction);
+  row.arm_a = cross(from_a, direction);
+  row.arm_b = cross(from_b, direction);
   row.turn_a = a.inverse_inertia * row.arm_a;
   row.turn_b = b.inverse_inertia * row.arm_b;
-  row.mobility_a = a.inverse_mass + row.arm_a.dot(row.turn_a);
-  row.mobility_b = b.inverse_mass + row.arm_b.dot(row.turn_b);
+  row.mobility_a = a.inverse_mass + dot(row.arm_a, row.turn_a);
+  row.mobility_b = b.inverse_mass + dot(row.arm_b, row.turn_b);
   row.impulse = 0;
   return row;
 }
 
 Joint make_joint(const ContactPoint& contact, std::span<const BodyState> states,
-                 const std::vector<Mover>& movers, const SolverOptions& options, const StepInput& part) {
-  const double gravity_speed = part.dt * part.gravity.norm();
+                 const std::vector<Mover>& movers, const TestBedSolverOptions& options,
+                 const StepInput& part) {
+  const double gravity_speed = part.dt * norm(part.gravity);
   constexpr double kSlips = 0.01;      // of what gravity gives in a step
   constexpr double kBouncesAbove = 2;  // times that
   const Mover &a = movers[contact.body_a], &b = movers[contact.body_b];
-  const Vector3d from_a = contact.position - states[contact.body_a].position;
-  const Vector3d from_b = contact.position - states[contact.body_b].position;
-  const Vector3d relative = b.velocity + b.spin.cross(from_b) - a.velocity - a.spin.cross(from_a);
-  const double approach = -relative.dot(contact.normal);
-  const Vector3d slip = relative + approach * contact.normal;
-  const double speed = slip.norm();
-  const Vector3d first = speed > kSlips * gravity_speed ? Vector3d(slip / speed) : across(contact.normal);
+  const Vector3 from_a = contact.position - states[contact.body_a].position;
+  const Vector3 from_b = contact.position - states[contact.body_b].position;
+  const Vector3 relative = b.velocity + cross(b.spin, from_b) - a.velocity - cross(a.spin, from_a);
+  const double approach = -dot(relative, contact.normal);
+  const Vector3 slip = relative + approach * contact.normal;
+  const double speed = norm(slip);
+  const Vector3 first = speed > kSlips * gravity_speed ? slip / speed : unit_orthogonal(contact.normal);
   Joint joint;
   joint.a = contact.body_a, joint.b = contact.body_b;
   joint.inverse_mass_a = a.inverse_mass, joint.inverse_mass_b = b.inverse_mass;
   joint.tangent[0] = make_row(first, from_a, from_b, a, b);
-  joint.tangent[1] = make_row(contact.normal.cross(first), from_a, from_b, a, b);
+  joint.tangent[1] = make_row(cross(contact.normal, first), from_a, from_b, a, b);
   joint.normal = make_row(contact.normal, from_a, from_b, a, b);
   joint.target = approach > kBouncesAbove * gravity_speed ? options.restitution * approach : 0;
   if (contact.depth < 0) joint.target = contact.depth / part.dt;
@@ -167,7 +162,7 @@ void warm_start(Joint& joint, const ContactImpulse& impulse, double friction, st
   joint.normal.impulse = impulse.normal;
   const double bound = friction * impulse.normal;
   for (Row& row : joint.tangent)
-    row.impulse = std::clamp(row.direction.dot(impulse.tangential), -bound, bound);
+    row.impulse = std::clamp(dot(row.direction, impulse.tangential), -bound, bound);
   for (const Row* row : {&joint.tangent[0], &joint.tangent[1], &joint.normal}) {
     push_apart(joint, *row, row->impulse, a, b, {});
   }
@@ -188,7 +183,8 @@ void shuffle(std::vector<std::uint32_t>& order, std::uint64_t seed) {
 class IslandSweeps {
  public:
   IslandSweeps(std::span<const std::uint32_t> contacts, std::vector<Joint>& joints,
-               std::vector<Mover>& movers, std::vector<Velocities>& corrections, const SolverOptions& options)
+               std::vector<Mover>& movers, std::vector<Velocities>& corrections,
+               const TestBedSolverOptions& options)
       : order_(contacts.begin(), contacts.end()),
         joints_(joints),
         movers_(movers),
@@ -263,23 +259,15 @@ class IslandSweeps {
   std::vector<Joint>& joints_;
   std::vector<Mover>& movers_;
   std::vector<Velocities>& corrections_;
-  const SolverOptions& options_;
+  const TestBedSolverOptions& options_;
 };
 
 Mover make_mover(const BodyProperties& body, const BodyState& state) {
   const bool moves = body.motion == Motion::moving;
-  const Vector3d still = Vector3d::Zero();
   const bool is_fixed = body.motion == Motion::fixed;
-  return {{is_fixed ? still : state.velocity, is_fixed ? still : state.angular_velocity},
+  return {{is_fixed ? Vector3{} : state.velocity, is_fixed ? Vector3{} : state.angular_velocity},
           moves ? 1 / body.mass : 0,
           world_inverse_inertia(body, state)};
-}
-
-template <typename Work>
-void for_each(std::size_t count, const Work& work) {
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, 64), [&](const auto& range) {
-    for (std::size_t i = range.begin(); i < range.end(); ++i) work(i);
-  });
 }
 
 // Moves with their bodies, between two searches for contacts, the contacts that a step was given.
@@ -316,19 +304,19 @@ class FollowedContacts {
 // move the bodies once, and never become kinetic energy (split impulses).
 //
 // An island is done before all sweeps are made when one changes no velocity by more than 10⁻⁹ of what gravity
-// gives in a step. Islands are solved side by side by the threads of the caller's oneTBB arena. The bytes are
-// the same for any number of them.
+// gives in a step. Islands are solved side by side; the bytes are the same for any
+// number of threads.
 //
 // There are as many solutions as substeps. With warm start, a step that has no impulse of the step before
 // makes ten times the sweeps.
 class SweepSolver final : public StepSolver {
  public:
-  explicit SweepSolver(const SolverOptions& options) : options_(options) {}
+  explicit SweepSolver(const TestBedSolverOptions& options) : options_(options) {}
 
   void step(const StepInput& input, std::span<BodyState> states,
             std::span<ContactImpulse> impulses) override {
     constexpr std::uint32_t kCold = 10;
-    SolverOptions options = options_;
+    TestBedSolverOptions options = options_;
     if (options.warm_start && input.is_cold) options.iterations *= kCold;  // or stacks sink at once
     const double dt = input.dt / options.substeps;
     FollowedContacts followed(input.contacts, states);
@@ -338,7 +326,7 @@ class SweepSolver final : public StepSolver {
         if (input.bodies[body].motion == Motion::moving) states[body].velocity += dt * input.gravity;
       }
       solve({input.bodies, followed.contacts(), input.islands, dt, input.gravity,
-             input.number * options.substeps + i, input.is_cold},
+             input.number * options.substeps + i, input.is_cold, input.threads},
             options, states, impulses);
       for (std::size_t body = 0; body < states.size(); ++body) {
         advance(input.bodies[body], states[body], corrections_[body].velocity, corrections_[body].spin, dt);
@@ -349,14 +337,14 @@ class SweepSolver final : public StepSolver {
  private:
   // Solves for the velocities at the end of a part of a step. Results: states' velocities, impulses,
   // corrections_. Condition: velocities include all that is not contacts.
-  void solve(const StepInput& part, const SolverOptions& options, std::span<BodyState> states,
+  void solve(const StepInput& part, const TestBedSolverOptions& options, std::span<BodyState> states,
              std::span<ContactImpulse> impulses) {
     begin(part, options, states);
     const auto layers =
         options.shock_propagation ? find_layers(part.bodies, part.contacts) : std::vector<std::uint32_t>();
     std::vector<Residual> residuals(part.islands.size());
     // Without contacts there is nothing to do, and most islands of a slide are such.
-    tbb::parallel_for(std::size_t{0}, part.islands.size(), [&](std::size_t i) {
+    part.threads.for_each(part.islands.size(), [&](std::size_t i) {
       if (!part.islands.contacts_of(i).empty())
         residuals[i] = solve_island(part, part.islands.contacts_of(i), options, impulses, layers);
     });
@@ -364,18 +352,19 @@ class SweepSolver final : public StepSolver {
     hand_out(part, states, impulses);
   }
 
-  void begin(const StepInput& part, const SolverOptions& options, std::span<const BodyState> states) {
+  void begin(const StepInput& part, const TestBedSolverOptions& options, std::span<const BodyState> states) {
     movers_.resize(part.bodies.size());
     joints_.resize(part.contacts.size());
     corrections_.assign(part.bodies.size(), {});
-    for_each(part.bodies.size(), [&](std::size_t i) { movers_[i] = make_mover(part.bodies[i], states[i]); });
-    for_each(part.contacts.size(), [&](std::size_t i) {
+    part.threads.for_each(part.bodies.size(),
+                          [&](std::size_t i) { movers_[i] = make_mover(part.bodies[i], states[i]); });
+    part.threads.for_each(part.contacts.size(), [&](std::size_t i) {
       joints_[i] = make_joint(part.contacts[i], states, movers_, options, part);
     });
   }
 
   Residual solve_island(const StepInput& part, std::span<const std::uint32_t> members,
-                        const SolverOptions& options, std::span<const ContactImpulse> impulses,
+                        const TestBedSolverOptions& options, std::span<const ContactImpulse> impulses,
                         std::span<const std::uint32_t> layers) {
     constexpr double kStill = 1e-9;  // of what gravity gives in a step
     if (options.warm_start) {
@@ -384,19 +373,19 @@ class SweepSolver final : public StepSolver {
     IslandSweeps solver(members, joints_, movers_, corrections_, options);
     if (options.order == ContactOrder::shuffled)
       solver.shuffle_order(options.seed ^ (part.number * 0x9E3779B97F4A7C15u + members.front()));
-    solver.solve(kStill * (part.dt * part.gravity.norm()));
+    solver.solve(kStill * (part.dt * norm(part.gravity)));
     if (options.shock_propagation) solver.propagate_shock(layers);
     return solver.residual();
   }
 
   void hand_out(const StepInput& part, std::span<BodyState> states,
                 std::span<ContactImpulse> impulses) const {
-    for_each(part.bodies.size(), [&](std::size_t i) {
+    part.threads.for_each(part.bodies.size(), [&](std::size_t i) {
       if (part.bodies[i].motion != Motion::moving) return;
       states[i].velocity = movers_[i].velocity;
       states[i].angular_velocity = movers_[i].spin;
     });
-    for_each(part.contacts.size(), [&](std::size_t i) {
+    part.threads.for_each(part.contacts.size(), [&](std::size_t i) {
       const Joint& joint = joints_[i];
       impulses[i].normal = joint.normal.impulse;
       impulses[i].tangential = joint.tangent[0].impulse * joint.tangent[0].direction +
@@ -404,7 +393,7 @@ class SweepSolver final : public StepSolver {
     });
   }
 
-  SolverOptions options_;
+  TestBedSolverOptions options_;
   std::vector<Mover> movers_;
   std::vector<Joint> joints_;
   std::vector<Velocities> corrections_;
@@ -412,7 +401,7 @@ class SweepSolver final : public StepSolver {
 
 }  // namespace
 
-std::unique_ptr<StepSolver> make_sweep_solver(const SolverOptions& options) {
+std::unique_ptr<StepSolver> make_sweep_solver(const TestBedSolverOptions& options) {
   return std::make_unique<SweepSolver>(options);
 }
 

@@ -14,7 +14,7 @@
 
 #include "bvhbuild/meshing/index_table.h"
 #include "bvhbuild/tree/surface_topology.h"
-#include "common/union_find.h"
+#include "kernels/common/union_find.h"
 #include "levels/nearest_triangle.h"
 
 namespace tandem::build {

@@ -1,6 +1,7 @@
-/// Tandem's C interface: exact contacts, manifolds, distances and times of impact of posed meshes, on the
-/// CPU. C99 and C++; link with -ltandem. docs/c.md is its page. scripts/write_interface writes from this
-/// header what other languages and the libraries' own rows need to know of it.
+/// Tandem's C interface: exact contacts, manifolds, distances and times of impact of posed meshes, and worlds
+/// of rigid bodies, on the CPU. C99 and C++; link with -ltandem. docs/c.md is its page.
+/// scripts/write_interface writes from this header what other languages and the libraries' own rows need to
+/// know of it.
 ///
 /// Conventions, of every function:
 /// - It returns a tandem_status, TANDEM_OK or what is wrong; or the answer itself where nothing can be wrong.
@@ -12,8 +13,9 @@
 ///   function fills begins with its size as well, which the caller sets. `reserved` is zero.
 /// - Rows of arguments and results (instances, pairs, contacts, ...) never change their layout.
 /// - Strings are UTF-8. Lengths are in the files' unit, angles in radians, times in seconds.
-/// - A scene takes one call at a time; several scenes work side by side. Assets never change, and any number
-///   of threads may use them. A scene starts the threads that it may use, and keeps them.
+/// - A scene or world takes one call at a time; several work side by side. Assets never change, and any
+/// number
+///   of threads may use them. A scene or world starts the threads that it may use, and keeps them.
 /// - Rounding is to nearest, subnormals included, as every thread begins. A question takes about 100 KB of
 ///   the stack.
 #ifndef TANDEM_TANDEM_H
@@ -90,7 +92,7 @@ enum {
   TANDEM_UNKNOWN_CONTACT = 203, TANDEM_POSE_NOT_RIGID = 204, TANDEM_TOO_MANY_INSTANCES = 205,
   TANDEM_TOO_MANY_PAIRS = 206, TANDEM_KEPT_MISMATCH = 207, TANDEM_MOTION_MISMATCH = 208,
   TANDEM_NO_ORIENTED_BLOCKS = 209, TANDEM_NO_AXIS_ALIGNED_BLOCKS = 210, TANDEM_NO_TOPOLOGY = 211, TANDEM_NO_FINEST_LEVEL = 212,
-  TANDEM_BAD_REACH = 213, TANDEM_BAD_TOLERANCE = 214, TANDEM_BAD_DURATION = 215,
+  TANDEM_BAD_REACH = 213, TANDEM_BAD_TOLERANCE = 214, TANDEM_BAD_DURATION = 215, TANDEM_NO_MASS = 216,
   // A GPU (tandem_cuda.h).
   TANDEM_NO_GPU = 300, TANDEM_DRIVER_TOO_OLD = 301, TANDEM_GPU_NOT_SUPPORTED = 302,
   TANDEM_OUT_OF_GPU_MEMORY = 303, TANDEM_CUDA_FAILED = 304
@@ -775,6 +777,129 @@ typedef struct tandem_counters {
 } tandem_counters;
 
 TANDEM_API tandem_status tandem_scene_get_counters(const tandem_scene* scene, tandem_counters* counters);
+
+/// ---- Worlds
+
+/// Rigid bodies that move under gravity and contacts, which are those of a scene: exact, for any mesh.
+/// Lengths are metres, masses kilograms, times seconds. The same calls give the same bytes, for any number of
+/// threads.
+typedef struct tandem_world tandem_world;
+
+typedef struct tandem_world_options {
+  uint32_t struct_size;
+  uint32_t no_gravity;             ///< 1: there is none
+  uint32_t no_friction;            ///< 1: it is 0
+  uint32_t no_slop;                ///< 1: it is 0
+  uint32_t no_rolling_resistance;  ///< 1: it is 0
+  uint32_t no_sleeping;            ///< 1: bodies that rest are not left alone
+  uint32_t continuous;             ///< 1: fast bodies are carried to where they first meet others
+  uint32_t substeps;               ///< parts of a step that share its contacts, at most 10,000; 0: 16
+  uint32_t threads;                ///< that a call may use, the caller's included, at most 1,024; 0: 1
+  uint32_t reserved;
+  double gravity[3];          ///< of components up to 1e6; 0: 0, 0, -9.81
+  double friction;            ///< Coulomb's coefficient, at most 1e6; 0: 0.5
+  double restitution;         ///< part of the speed that an impact gives back, 0 to 1
+  double slop;                ///< overlap that is left alone, at most 1e6; 0: 1/4000 of the least diagonal of
+                              ///< an asset of a moving body
+  double rolling_resistance;  ///< lever at which the force between two bodies resists that they turn against
+                              ///< each other, at most 1e6; 0: 16 slops
+} tandem_world_options;
+
+/// Makes a world, which has the options for good. Its handle, and what the questions in a step take, come
+/// from the allocator; bodies, contacts and what solving takes, from the C++ runtime. Result:
+/// TANDEM_BAD_OPTION, also where an option is not 0 beside the flag that says it is.
+TANDEM_API tandem_status tandem_world_create(const tandem_world_options* options,
+                                             const tandem_allocator* allocator, tandem_world** world);
+/// Gives up its assets, and its bodies are gone. Null does nothing.
+TANDEM_API void tandem_world_destroy(tandem_world* world);
+
+/// Names the assets that bodies refer to, as tandem_scene_set_assets(). There are no bodies afterwards.
+TANDEM_API tandem_status tandem_world_set_assets(tandem_world* world, tandem_asset* const* assets,
+                                                 size_t count);
+
+/// How bodies start. Arrays have `count` entries, one for each body (TANDEM_MOTION_MISMATCH where there are
+/// others), or are null.
+typedef struct tandem_body_start {
+  uint32_t struct_size;
+  uint32_t reserved;
+  size_t count;
+  const double* density;  ///< of bodies that move; null: 1000. The mass is that of what the mesh encloses; an
+                          ///< open mesh is a shell, a hundredth of its diagonal thick
+  const double* velocity;  ///< of the centre of mass, x, y, z of each; null: 0. A kinematic body keeps it
+  const double* angular_velocity;  ///< x, y, z of each; null: 0
+} tandem_body_start;
+
+/// Places all bodies anew, at time 0. filter: or null; a sleeping body starts awake. start: or null. Result:
+/// as of tandem_scene_place(); also, where tandem_world_where() is the body, TANDEM_OUT_OF_RANGE of a
+/// velocity that is not finite, and TANDEM_NO_MASS where a moving body's mesh has no extent or its density is
+/// not positive; TANDEM_NO_TOPOLOGY, where it is the asset. After an error there are no bodies.
+TANDEM_API tandem_status tandem_world_set_bodies(tandem_world* world, const tandem_instance* instances,
+                                                 size_t count, const tandem_pair_filter* filter,
+                                                 const tandem_body_start* start);
+
+/// Makes steps of dt seconds. Result: TANDEM_BAD_DURATION where dt is not more than 0 or more than 1000;
+/// TANDEM_OUT_OF_RANGE, where tandem_world_where() is the body, where one has left the range of numbers that
+/// questions take; TANDEM_OUT_OF_MEMORY. After an error bodies are as after the last step that was whole.
+TANDEM_API tandem_status tandem_world_step(tandem_world* world, double dt, uint32_t steps);
+
+/// Where a body is, and how it moves.
+typedef struct tandem_body_motion {
+  tandem_pose pose;
+  double centre[3];            ///< of mass, in the world; of a fixed body the translation
+  double velocity[3];          ///< of the centre
+  double angular_velocity[3];  ///< in the world
+  uint8_t sleeps;  ///< 1: it rests with all that it touches, and is not looked at until it is touched
+  uint8_t reserved[7];
+} tandem_body_motion;
+
+/// Returns the bodies by number, and null and 0 where there are none. Valid until the next call that may
+/// change them.
+TANDEM_API const tandem_body_motion* tandem_world_bodies(const tandem_world* world, size_t* count);
+
+/// A point where two bodies touch, or nearly so, and what they did there in the last step.
+typedef struct tandem_world_contact {
+  uint32_t a, b;  ///< bodies, a < b
+  double position[3];
+  double normal[3];   ///< unit, from a towards b
+  double depth;       ///< along the normal; less than 0 of a gap
+  double impulse[3];  ///< on b, friction included; on a the opposite one. Newton seconds
+} tandem_world_contact;
+
+/// Returns the contacts that the last step solved, by ascending pair of bodies; not those of two sleeping
+/// bodies. Valid as long as tandem_world_bodies().
+TANDEM_API const tandem_world_contact* tandem_world_contacts(const tandem_world* world, size_t* count);
+
+/// Returns the seconds of all steps since bodies were placed.
+TANDEM_API double tandem_world_time(const tandem_world* world);
+
+/// Returns a body's mass; 0 of one that contacts do not move.
+TANDEM_API double tandem_world_mass(const tandem_world* world, uint32_t body);
+
+/// Puts a body elsewhere or gives it other velocities, and wakes it. `centre` and `sleeps` are not looked at.
+/// Result, where tandem_world_where() is the body: TANDEM_UNKNOWN_INSTANCE, TANDEM_POSE_NOT_RIGID,
+/// TANDEM_OUT_OF_RANGE. After an error nothing has changed.
+TANDEM_API tandem_status tandem_world_set_body(tandem_world* world, uint32_t body,
+                                               const tandem_body_motion* motion);
+
+/// Adds to a moving body's velocities what an impulse at a point of the world does, both x, y, z, and wakes
+/// it; others stay as they are. Result: as of tandem_world_set_body().
+TANDEM_API tandem_status tandem_world_push(tandem_world* world, uint32_t body, const double* impulse,
+                                           const double* at);
+
+/// All that the next steps of a world depend on, beside options, assets and what bodies are.
+typedef struct tandem_world_state tandem_world_state;
+
+/// Keeps the state of the world. It may outlive the world.
+TANDEM_API tandem_status tandem_world_save(const tandem_world* world, tandem_world_state** state);
+/// Goes back to a state. There are no contacts until the next step. Result: TANDEM_KEPT_MISMATCH where it is
+/// of another world, or of bodies that were placed before.
+TANDEM_API tandem_status tandem_world_restore(tandem_world* world, const tandem_world_state* state);
+/// Destroys the handle; null does nothing.
+TANDEM_API void tandem_world_state_destroy(tandem_world_state* state);
+
+/// The asset or body that is to blame for the last call's error; 0 after TANDEM_OK, and where the status
+/// alone says what is wrong.
+TANDEM_API uint64_t tandem_world_where(const tandem_world* world);
 
 #ifdef __cplusplus
 }

@@ -83,6 +83,7 @@ enum class [[nodiscard]] Status : std::uint32_t{
     kBadReach = 213,  ///< `reach` or `within` is negative, NaN or larger than the query can take
     kBadTolerance,    ///< a tolerance is negative, NaN or larger than the query can take
     kBadDuration,     ///< a step's length is negative or not finite
+    kNoMass,          ///< a moving body's mesh has no extent, or its density is not a positive number
     // These are of a GPU; status_of() of gpu_status.h names CUDA's errors.
     kNoGpu = 300,      ///< none here, none that this process may use, or no driver
     kDriverTooOld,     ///< for the CUDA version that the program was built with

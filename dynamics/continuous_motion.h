@@ -2,27 +2,28 @@
 #include <span>
 #include <vector>
 
-#include "rigid_body.h"
+#include "dynamics/contact_finder.h"
+#include "dynamics/rigid_body.h"
 #include "tandem/kernels/impact_query.h"
-#include "tandem/kernels/manifold_query.h"
 
-namespace tandem::simulation {
+namespace tandem::dynamics {
 
 /// Keeps fast bodies from passing through others in a step: they are carried to where they first meet
 /// another body, a slop deep, so that the next step has a contact there and stops them. Where two touch
 /// already they go on until they are deeper in each other by a part of the thinner one's inner radius. What
-/// is left of the step's way is lost, velocities are not.
+/// is left of the step's way is lost. Velocities are those of the time of impact; of bodies that touched
+/// already, and that contacts did not hold, they are lost with the way, so that no energy comes of it.
 ///
 /// A body is fast where one of its points moves by more than half the inner radius of the thinnest closed
 /// shape: half the least side of its bounds. Steps without a fast body cost next to nothing.
 class ContinuousMotion {
  public:
   /// The data that the shapes and the filter look at must outlive this. The filter names the pairs that may
-  /// meet; its motions are not looked at. Throws EngineError where a shape cannot be taken.
+  /// meet; its motions are not looked at. Throws QueryFailed where a shape cannot be taken.
   ContinuousMotion(std::span<const AssetView> shapes, std::uint32_t threads, const PairFilter& filter = {});
 
   /// Takes back what of the way from `before` to `after` leads through other bodies. Throws
-  /// EngineError where a query fails.
+  /// QueryFailed where a query fails.
   void limit(std::span<const BodyProperties> bodies, std::span<const BodyState> before,
              std::span<BodyState> after, double slop);
 
@@ -44,12 +45,13 @@ class ContinuousMotion {
   ManifoldQuery manifolds_;
   std::vector<double> inner_radius_;  // of each shape; infinite where it is not closed
 
-  std::vector<Motion> fast_;           // moving: fast; fixed: not
-  std::vector<Eigen::Vector3d> turn_;  // of each body, in the whole step
-  std::vector<Eigen::Vector3d> way_;   // of its centre of mass
-  std::vector<double> part_, stop_;    // of both, that it goes; and of that, in a round
+  std::vector<Motion> fast_;         // moving: fast; fixed: not
+  std::vector<Vector3> turn_;        // of each body, in the whole step
+  std::vector<Vector3> way_;         // of its centre of mass
+  std::vector<double> part_, stop_;  // of both, that it goes; and of that, in a round
+  std::vector<double> held_;         // the least such part of a pair that touches already
   std::vector<Instance> instances_;
   std::vector<RigidMotion> motion_;
 };
 
-}  // namespace tandem::simulation
+}  // namespace tandem::dynamics

@@ -1,21 +1,19 @@
-#include "step_solver.h"
-
-#include <tbb/parallel_for.h>
+#include "dynamics/step_solver.h"
 
 #include <algorithm>
 #include <atomic>
 #include <cmath>
 
-#include "island_problem.h"
+#include "dynamics/island_problem.h"
 
-namespace tandem::simulation {
+namespace tandem::dynamics {
 namespace {
 
-using Eigen::Vector3d;
-
+// Moves by the mean velocity of the step, which is exact.
 void fly(const StepInput& input, std::uint32_t body, std::span<BodyState> states) {
-  states[body].velocity += input.dt * input.gravity;
-  advance(input.bodies[body], states[body], Vector3d::Zero(), Vector3d::Zero(), input.dt);
+  const Vector3 gain = input.dt * input.gravity;
+  states[body].velocity += gain;
+  advance(input.bodies[body], states[body], -0.5 * gain, Vector3{}, input.dt);
 }
 
 // Returns whether factorising the island's matrix costs no more than what Newton's method has to do for each
@@ -46,7 +44,7 @@ class IslandSolver final : public StepSolver {
     const std::vector<std::uint32_t> layers = find_layers(input.bodies, input.contacts);
     std::vector<Residual> residuals(input.islands.size());
     std::atomic<std::uint64_t> by_newton = 0;
-    tbb::parallel_for(std::size_t{0}, input.islands.size(), [&](std::size_t i) {
+    input.threads.for_each(input.islands.size(), [&](std::size_t i) {
       if (input.islands.contacts_of(i).empty()) {
         for (const std::uint32_t body : input.islands.bodies_of(i)) fly(input, body, states);
         return;
@@ -60,7 +58,7 @@ class IslandSolver final : public StepSolver {
     });
     for (std::uint32_t i = 0; i < states.size(); ++i) {
       if (input.bodies[i].motion == Motion::kinematic)
-        advance(input.bodies[i], states[i], Vector3d::Zero(), Vector3d::Zero(), input.dt);
+        advance(input.bodies[i], states[i], Vector3{}, Vector3{}, input.dt);
     }
     sum_up(input.islands, residuals);
     statistics_.newton_islands = by_newton;
@@ -91,16 +89,8 @@ void StepSolver::sum_up(const Islands& islands, std::span<const Residual> residu
       std::sqrt(statistics_.residual_rms / (3 * static_cast<double>(statistics_.contacts)));
 }
 
-std::uint32_t default_substeps(SolverKind kind) {
-  constexpr std::uint32_t kSoft = 16;
-  return kind == SolverKind::sweeps ? 1 : kSoft;
-}
-
 std::unique_ptr<StepSolver> make_step_solver(const SolverOptions& options) {
-  SolverOptions complete = options;
-  if (complete.substeps == 0) complete.substeps = default_substeps(options.kind);
-  if (complete.kind == SolverKind::sweeps) return make_sweep_solver(complete);
-  return std::make_unique<IslandSolver>(complete);
+  return std::make_unique<IslandSolver>(options);
 }
 
-}  // namespace tandem::simulation
+}  // namespace tandem::dynamics

@@ -1,12 +1,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "island_problem.h"
+#include "dynamics/island_problem.h"
 
-namespace tandem::simulation {
+namespace tandem::dynamics {
 namespace {
-
-using Eigen::Vector3d;
 
 // The numbers of a soft row, where bodies are too deep in each other.
 struct Softness {
@@ -14,7 +12,7 @@ struct Softness {
 };
 
 Softness softness(double frequency, double damping_ratio, double h) {
-  const double omega = 2 * M_PI * frequency;
+  const double omega = 2 * kPi * frequency;
   const double a1 = 2 * damping_ratio + h * omega, a2 = h * omega * a1;
   return {omega / a1, a2 / (1 + a2), 1 / (1 + a2)};
 }
@@ -56,8 +54,8 @@ class SoftStep {
     for (int k = 0; k < kRestitutionSweeps; ++k) {
       for (std::size_t i = 0; i < contacts; ++i) restitute(i);
     }
-    for (Vector3d& impulse : p_.impulse) impulse *= substeps_;
-    for (TouchingPair& pair : p_.pairs) pair.impulse *= substeps_;
+    for (Vector3& impulse : p_.impulse) impulse = substeps_ * impulse;
+    for (TouchingPair& pair : p_.pairs) pair.impulse = substeps_ * pair.impulse;
   }
 
   // Condition: solve() was called.
@@ -75,16 +73,16 @@ class SoftStep {
     normal_mass_.resize(contacts), friction_mass_.resize(contacts);
     followed_ = p_.separation;
     strongest_.assign(contacts, 0);
-    pushed_.assign(p_.bodies.size(), Vector6::Zero());
+    pushed_.assign(p_.bodies.size(), Vector6{});
     for (std::size_t i = 0; i < contacts; ++i) {
       normal_mass_[i] = 1 / p_.normal[i].mobility();
       friction_mass_[i] = 1 / p_.friction_mobility(i);
-      p_.impulse[i] /= substeps_;
+      p_.impulse[i] = p_.impulse[i] / substeps_;
       pushed_[p_.a[i]] += p_.change_of_a(i, p_.impulse[i]);
       pushed_[p_.b[i]] += p_.change_of_b(i, p_.impulse[i]);
     }
     for (TouchingPair& pair : p_.pairs) {
-      pair.impulse /= substeps_;
+      pair.impulse = pair.impulse / substeps_;
       pushed_[p_.a[pair.begin]] += pair.change_of_a(pair.impulse);
       pushed_[p_.b[pair.begin]] += pair.change_of_b(pair.impulse);
     }
@@ -101,10 +99,10 @@ class SoftStep {
     for (const TouchingPair& pair : p_.pairs) {
       for (std::uint32_t i = pair.begin; i < pair.end; ++i) {
         if (p_.separation[i] > -deep) continue;
-        const Vector3d& normal = contacts_[p_.contacts[i]].normal;
+        const Vector3& normal = contacts_[p_.contacts[i]].normal;
         double opposed = 0;
         for (std::uint32_t j = pair.begin; j < pair.end; ++j) {
-          const double along = normal.dot(contacts_[p_.contacts[j]].normal);
+          const double along = dot(normal, contacts_[p_.contacts[j]].normal);
           opposed = std::max(opposed, std::min(along, 0.0) * std::min(p_.separation[j], 0.0));
         }
         opposed_[i] = std::min(opposed, -deep - p_.separation[i]);
@@ -120,8 +118,8 @@ class SoftStep {
 
   void visit_normal(std::size_t i, double bias, double mass_scale, double impulse_scale) {
     const ContactRow& row = p_.normal[i];
-    const double w = p_.along(row, i, p_.velocity) + p_.drive[i].x();
-    double& impulse = p_.impulse[i].x();
+    const double w = p_.along(row, i, p_.velocity) + p_.drive[i].x;
+    double& impulse = p_.impulse[i].x;
     const double wanted = impulse - normal_mass_[i] * mass_scale * (w + bias) - impulse_scale * impulse;
     const double next = std::max(0.0, wanted);
     add(row, i, next - impulse);
@@ -138,34 +136,34 @@ class SoftStep {
   }
 
   void relax(std::size_t i, double time) {
-    const double s = p_.separation[i] + p_.along(p_.normal[i], i, p_.displacement) + time * p_.drive[i].x();
+    const double s = p_.separation[i] + p_.along(p_.normal[i], i, p_.displacement) + time * p_.drive[i].x;
     followed_[i] = s;
     visit_normal(i, std::max(0.0, s / h_), 1, 0);
   }
 
   void visit_friction(std::size_t i) {
-    Vector3d& impulse = p_.impulse[i];
-    const double bound = friction_ * impulse.x();
-    const double w1 = p_.along(p_.first[i], i, p_.velocity) + p_.drive[i].y();
-    const double w2 = p_.along(p_.second[i], i, p_.velocity) + p_.drive[i].z();
-    double next1 = impulse.y() - friction_mass_[i] * w1, next2 = impulse.z() - friction_mass_[i] * w2;
+    Vector3& impulse = p_.impulse[i];
+    const double bound = friction_ * impulse.x;
+    const double w1 = p_.along(p_.first[i], i, p_.velocity) + p_.drive[i].y;
+    const double w2 = p_.along(p_.second[i], i, p_.velocity) + p_.drive[i].z;
+    double next1 = impulse.y - friction_mass_[i] * w1, next2 = impulse.z - friction_mass_[i] * w2;
     const double size = std::sqrt(next1 * next1 + next2 * next2);
     if (size > bound) next1 *= bound / size, next2 *= bound / size;
-    const double change1 = next1 - impulse.y(), change2 = next2 - impulse.z();
+    const double change1 = next1 - impulse.y, change2 = next2 - impulse.z;
     p_.velocity[p_.a[i]] += change1 * p_.first[i].a + change2 * p_.second[i].a;
     p_.velocity[p_.b[i]] += change1 * p_.first[i].b + change2 * p_.second[i].b;
-    impulse.y() = next1, impulse.z() = next2;
+    impulse.y = next1, impulse.z = next2;
   }
 
   void visit_turning(TouchingPair& pair) {
     double push = 0;
-    for (std::uint32_t contact = pair.begin; contact < pair.end; ++contact) push += p_.impulse[contact].x();
+    for (std::uint32_t contact = pair.begin; contact < pair.end; ++contact) push += p_.impulse[contact].x;
     const double bound = rolling_resistance_ * push;
-    const Vector3d turning = p_.turning(pair, p_.velocity) + pair.drive;
-    Vector3d next = pair.impulse - turning / pair.mobility;
-    const double size = next.norm();
-    if (size > bound) next *= bound / size;
-    const Vector3d change = next - pair.impulse;
+    const Vector3 turning = p_.turning(pair, p_.velocity) + pair.drive;
+    Vector3 next = pair.impulse - turning / pair.mobility;
+    const double size = norm(next);
+    if (size > bound) next = (bound / size) * next;
+    const Vector3 change = next - pair.impulse;
     p_.velocity[p_.a[pair.begin]] += pair.change_of_a(change);
     p_.velocity[p_.b[pair.begin]] += pair.change_of_b(change);
     pair.impulse = next;
@@ -199,4 +197,4 @@ Residual solve_soft_step(IslandProblem& problem, const StepInput& input, const S
   return step.residual();
 }
 
-}  // namespace tandem::simulation
+}  // namespace tandem::dynamics

@@ -1,23 +1,22 @@
 #pragma once
-#include <Eigen/Core>
-#include <Eigen/Geometry>
 #include <cstdint>
 #include <span>
 #include <utility>
 #include <vector>
 
-#include "contacts.h"
+#include "dynamics/contact_point.h"
+#include "tandem/kernels/object_pair.h"
 
-namespace tandem::simulation {
+namespace tandem::dynamics {
 
 /// A contact of a step and its impulse, as the next step needs them.
 struct CachedContact {
   ObjectPair pair;
   std::uint64_t feature;
   ContactAnchor anchor;
-  Eigen::Vector3d normal_in_a;  ///< the normal, in a's frame
-  std::uint32_t quiet_steps;    ///< since it was found or last pushed
-  ContactImpulse impulse;       ///< of the last step
+  Vector3 normal_in_a;        ///< the normal, in a's frame
+  std::uint32_t quiet_steps;  ///< since it was found or last pushed
+  ContactImpulse impulse;     ///< of the last step
 };
 
 /// Remembers the contacts of a step and their impulses. Pairs that have not moved keep their contacts:
@@ -72,4 +71,4 @@ class ContactCache {
   bool is_cold_ = true;
 };
 
-}  // namespace tandem::simulation
+}  // namespace tandem::dynamics

@@ -1,150 +1,205 @@
-#include <Eigen/SparseCholesky>
-#include <Eigen/SparseCore>
 #include <algorithm>
 #include <cmath>
 #include <utility>
 #include <vector>
 
-#include "island_problem.h"
+#include "dynamics/island_problem.h"
 
-namespace tandem::simulation {
+namespace tandem::dynamics {
 namespace {
 
-using Eigen::Vector2d;
-using Eigen::Vector3d;
-using Eigen::VectorXd;
+using manifold::Vector2;
 
-using Matrix6 = Eigen::Matrix<double, 6, 6>;
-using Pair = std::pair<std::uint32_t, std::uint32_t>;
+// A block of a matrix: of the six velocities of one body by those of another.
+struct Matrix6 {
+  double at[6][6];
 
-// The blocks of a contact's bodies, the lower first. Condition: contacts move both.
-Pair blocks_of(const IslandProblem& problem, std::size_t contact) {
-  const auto [low, high] = std::minmax(problem.a[contact], problem.b[contact]);
-  return {low - 1, high - 1};
+  static Matrix6 identity() {
+    Matrix6 out = {};
+    for (int i = 0; i < 6; ++i) out.at[i][i] = 1;
+    return out;
+  }
+};
+
+struct Array6 {
+  double at[6];
+
+  explicit Array6(const Vector6& v)
+      : at{v.linear.x, v.linear.y, v.linear.z, v.angular.x, v.angular.y, v.angular.z} {}
+  Vector6 vector() const { return {{at[0], at[1], at[2]}, {at[3], at[4], at[5]}}; }
+};
+
+// m += left right^T
+void add_product(Matrix6& m, const Vector6& left, const Vector6& right) {
+  const Array6 p(left), q(right);
+  for (int i = 0; i < 6; ++i) {
+    for (int j = 0; j < 6; ++j) m.at[i][j] += p.at[i] * q.at[j];
+  }
 }
 
-bool is_between_two(const IslandProblem& problem, std::size_t contact) {
-  return problem.a[contact] > 0 && problem.b[contact] > 0;
+// m -= p q^T
+void subtract_product(Matrix6& m, const Matrix6& p, const Matrix6& q) {
+  for (int i = 0; i < 6; ++i) {
+    for (int k = 0; k < 6; ++k) {
+      for (int j = 0; j < 6; ++j) m.at[i][j] -= p.at[i][k] * q.at[j][k];
+    }
+  }
 }
 
-// A sparse symmetric matrix of 6 x 6 blocks: one for each body of an island and one for each two that touch.
-// Its order of elimination is found once, its factors anew for each set of values.
+// m becomes its lower triangle L with L L^T = m. False: it is not positive definite, to rounding.
+bool factorise_block(Matrix6& m) {
+  for (int j = 0; j < 6; ++j) {
+    double rest = m.at[j][j];
+    for (int k = 0; k < j; ++k) rest -= m.at[j][k] * m.at[j][k];
+    if (!(rest > 0)) return false;
+    m.at[j][j] = std::sqrt(rest);
+    for (int i = j + 1; i < 6; ++i) {
+      double value = m.at[i][j];
+      for (int k = 0; k < j; ++k) value -= m.at[i][k] * m.at[j][k];
+      m.at[i][j] = value / m.at[j][j];
+    }
+  }
+  return true;
+}
+
+// m becomes m L^-T.
+void divide_by_transposed(Matrix6& m, const Matrix6& lower) {
+  for (auto& row : m.at) {
+    for (int j = 0; j < 6; ++j) {
+      for (int k = 0; k < j; ++k) row[j] -= row[k] * lower.at[j][k];
+      row[j] /= lower.at[j][j];
+    }
+  }
+}
+
+// A sparse symmetric matrix of 6 x 6 blocks: one for each body of an island and one for each two that touch,
+// and its Cholesky factors. Bodies come by ascending layer (make_island_problem()), so that the matrix is a
+// band, and are eliminated in this order.
 class BlockMatrix {
  public:
-  explicit BlockMatrix(const IslandProblem& problem) : problem_(problem), bodies_(problem.bodies.size() - 1) {
-    find_pairs();
-    lay_out();
-    factors_.analyzePattern(matrix_);
+  explicit BlockMatrix(const IslandProblem& problem)
+      : problem_(problem), rows_(problem.bodies.size() - 1), block_(rows_.size()), diagonal_(rows_.size()) {
+    for (std::size_t i = 0; i < problem.contact_count(); ++i) {
+      if (problem.a[i] == 0 || problem.b[i] == 0) continue;
+      const auto [low, high] = std::minmax(problem.a[i], problem.b[i]);
+      rows_[low - 1].push_back(high - 1);
+    }
+    // Eliminating a body joins all that it touches further on.
+    for (auto& rows : rows_) {
+      std::sort(rows.begin(), rows.end());
+      rows.erase(std::unique(rows.begin(), rows.end()), rows.end());
+      if (!rows.empty()) rows_[rows[0]].insert(rows_[rows[0]].end(), rows.begin() + 1, rows.end());
+    }
+    for (std::size_t j = 0; j < rows_.size(); ++j) block_[j].resize(rows_[j].size());
   }
 
   void set_identity() {
-    std::fill(diagonal_.begin(), diagonal_.end(), Matrix6::Identity());
-    std::fill(beside_.begin(), beside_.end(), Matrix6::Zero());
+    std::fill(diagonal_.begin(), diagonal_.end(), Matrix6::identity());
+    for (auto& blocks : block_) std::fill(blocks.begin(), blocks.end(), Matrix6{});
   }
 
   // Adds left^T * weight * right, two rows of one contact.
   void add(std::size_t contact, const ContactRow& left, const ContactRow& right, double weight) {
     const std::uint32_t a = problem_.a[contact], b = problem_.b[contact];
-    if (a > 0) diagonal_[a - 1].noalias() += (weight * left.a) * right.a.transpose();
-    if (b > 0) diagonal_[b - 1].noalias() += (weight * left.b) * right.b.transpose();
+    if (a > 0) add_product(diagonal_[a - 1], weight * left.a, right.a);
+    if (b > 0) add_product(diagonal_[b - 1], weight * left.b, right.b);
     if (a == 0 || b == 0) return;
-    if (a < b) {
-      beside_[pair_[contact]].noalias() += (weight * left.b) * right.a.transpose();
-    } else {
-      beside_[pair_[contact]].noalias() += (weight * left.a) * right.b.transpose();
-    }
+    if (a < b)
+      add_product(beside(a - 1, b - 1), weight * left.b, right.a);
+    else
+      add_product(beside(b - 1, a - 1), weight * left.a, right.b);
   }
 
-  // Result: false if the matrix is not positive definite, to rounding.
+  // The factors take the place of the matrix. Result: false if it is not positive definite, to rounding.
   bool factorise() {
-    for (std::size_t j = 0; j < bodies_; ++j) {
-      for (int c = 0; c < 6; ++c) {
-        double* at = matrix_.valuePtr() + matrix_.outerIndexPtr()[6 * j + c];
-        for (int r = c; r < 6; ++r) *at++ = diagonal_[j](r, c);
-        for (std::size_t p = first_pair_[j]; p < first_pair_[j + 1]; ++p) {
-          for (int r = 0; r < 6; ++r) *at++ = beside_[p](r, c);
+    for (std::uint32_t j = 0; j < rows_.size(); ++j) {
+      if (!factorise_block(diagonal_[j])) return false;
+      for (Matrix6& block : block_[j]) divide_by_transposed(block, diagonal_[j]);
+      for (std::size_t q = 0; q < rows_[j].size(); ++q) {
+        const std::uint32_t column = rows_[j][q];
+        subtract_product(diagonal_[column], block_[j][q], block_[j][q]);
+        auto row = rows_[column].begin();
+        for (std::size_t p = q + 1; p < rows_[j].size(); ++p) {
+          row = std::lower_bound(row, rows_[column].end(), rows_[j][p]);
+          subtract_product(block_[column][static_cast<std::size_t>(row - rows_[column].begin())],
+                           block_[j][p], block_[j][q]);
         }
       }
     }
-    factors_.factorize(matrix_);
-    return factors_.info() == Eigen::Success;
+    return true;
   }
 
-  // Condition: factorise() has been true.
-  Eigen::VectorXd solve(const Eigen::VectorXd& right) const { return factors_.solve(right); }
+  // x: the right side, then the solution; x[0] is nobody's. Condition: factorise() has been true.
+  void solve(std::vector<Vector6>& x) const {
+    for (std::size_t j = 0; j < rows_.size(); ++j) {
+      Array6 own(x[j + 1]);
+      for (int i = 0; i < 6; ++i) {
+        for (int k = 0; k < i; ++k) own.at[i] -= diagonal_[j].at[i][k] * own.at[k];
+        own.at[i] /= diagonal_[j].at[i][i];
+      }
+      x[j + 1] = own.vector();
+      for (std::size_t p = 0; p < rows_[j].size(); ++p) {
+        Array6 other(x[rows_[j][p] + 1]);
+        for (int i = 0; i < 6; ++i) {
+          for (int k = 0; k < 6; ++k) other.at[i] -= block_[j][p].at[i][k] * own.at[k];
+        }
+        x[rows_[j][p] + 1] = other.vector();
+      }
+    }
+    for (std::size_t j = rows_.size(); j-- > 0;) {
+      Array6 own(x[j + 1]);
+      for (std::size_t p = 0; p < rows_[j].size(); ++p) {
+        const Array6 other(x[rows_[j][p] + 1]);
+        for (int i = 0; i < 6; ++i) {
+          for (int k = 0; k < 6; ++k) own.at[k] -= block_[j][p].at[i][k] * other.at[i];
+        }
+      }
+      for (int i = 6; i-- > 0;) {
+        for (int k = i + 1; k < 6; ++k) own.at[i] -= diagonal_[j].at[k][i] * own.at[k];
+        own.at[i] /= diagonal_[j].at[i][i];
+      }
+      x[j + 1] = own.vector();
+    }
+  }
 
  private:
-  void find_pairs() {
-    const std::size_t contacts = problem_.contact_count();
-    for (std::size_t i = 0; i < contacts; ++i) {
-      if (is_between_two(problem_, i)) pairs_.push_back(blocks_of(problem_, i));
-    }
-    std::sort(pairs_.begin(), pairs_.end());
-    pairs_.erase(std::unique(pairs_.begin(), pairs_.end()), pairs_.end());
-    pair_.resize(contacts);
-    for (std::size_t i = 0; i < contacts; ++i) {
-      if (!is_between_two(problem_, i)) continue;
-      const auto found = std::lower_bound(pairs_.begin(), pairs_.end(), blocks_of(problem_, i));
-      pair_[i] = static_cast<std::uint32_t>(found - pairs_.begin());
-    }
-    first_pair_.assign(bodies_ + 1, 0);
-    for (const Pair& pair : pairs_) ++first_pair_[pair.first + 1];
-    for (std::size_t j = 0; j < bodies_; ++j) first_pair_[j + 1] += first_pair_[j];
-  }
-
-  // Column by column: what is below the diagonal of a body's own block, then its blocks with higher bodies.
-  void lay_out() {
-    diagonal_.resize(bodies_);
-    beside_.resize(pairs_.size());
-    const auto size = static_cast<Eigen::Index>(6 * bodies_);
-    matrix_.resize(size, size);
-    std::vector<int> rows;
-    rows.reserve(21 * bodies_ + 36 * pairs_.size());
-    int* const begin = matrix_.outerIndexPtr();
-    for (std::size_t j = 0; j < bodies_; ++j) {
-      for (int c = 0; c < 6; ++c) {
-        begin[6 * j + c] = static_cast<int>(rows.size());
-        for (int r = c; r < 6; ++r) rows.push_back(static_cast<int>(6 * j) + r);
-        for (std::size_t p = first_pair_[j]; p < first_pair_[j + 1]; ++p) {
-          for (int r = 0; r < 6; ++r) rows.push_back(static_cast<int>(6 * pairs_[p].second) + r);
-        }
-      }
-    }
-    begin[size] = static_cast<int>(rows.size());
-    matrix_.resizeNonZeros(static_cast<Eigen::Index>(rows.size()));
-    std::copy(rows.begin(), rows.end(), matrix_.innerIndexPtr());
+  Matrix6& beside(std::uint32_t low, std::uint32_t high) {
+    const auto& rows = rows_[low];
+    return block_[low]
+                 [static_cast<std::size_t>(std::lower_bound(rows.begin(), rows.end(), high) - rows.begin())];
   }
 
   const IslandProblem& problem_;
-  std::size_t bodies_;
-  std::vector<Pair> pairs_;              // the lower body first, ascending
-  std::vector<std::uint32_t> pair_;      // of each contact between two bodies
-  std::vector<std::size_t> first_pair_;  // of each lower body
-  std::vector<Matrix6> diagonal_, beside_;
-  Eigen::SparseMatrix<double> matrix_;  // the lower triangle
-  Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>, Eigen::Lower> factors_;
+  std::vector<std::vector<std::uint32_t>> rows_;  // of each body: those further on that its column has
+  std::vector<std::vector<Matrix6>> block_;       // of each of these
+  std::vector<Matrix6> diagonal_;
 };
 
 // The derivative of Huber's function: what is wanted, but no longer than the bound.
 template <typename Vector>
 Vector shortened(const Vector& wanted, double bound) {
-  const double size = wanted.norm();
-  return size > bound ? Vector(wanted * (bound / size)) : wanted;
+  const double size = norm(wanted);
+  return size > bound ? (bound / size) * wanted : wanted;
 }
 
 // The derivative of shortened() along a change of what is wanted.
 template <typename Vector>
 Vector shortened_change(const Vector& wanted, double bound, const Vector& change) {
-  const double size = wanted.norm();
+  const double size = norm(wanted);
   if (size <= bound) return change;
-  const Vector along = wanted / size;
-  return (bound / size) * (change - along.dot(change) * along);
+  const Vector along = (1 / size) * wanted;
+  return (bound / size) * (change - dot(along, change) * along);
+}
+
+// The part of a contact's vector that is across the normal.
+Vector2 across(const Vector3& of_contact) {
+  return {of_contact.y, of_contact.z};
 }
 
 // The impulses of contacts, and those that resist turning of the pairs.
 struct IslandImpulses {
-  std::vector<Vector3d> contact;  // along normal, first and second
-  std::vector<Vector3d> turning;  // of each pair, about the axes of the world
+  std::vector<Vector3> contact;  // along normal, first and second
+  std::vector<Vector3> turning;  // of each pair, about the axes of the world
 };
 
 // The numbers that the least of the convex function depends on beside the rows.
@@ -173,7 +228,7 @@ class ConvexContacts {
         normal_softness_(problem.contact_count()),
         friction_softness_(problem.contact_count()),
         turning_softness_(problem.pairs.size()),
-        way_(problem.bodies.size(), Vector6::Zero()),
+        way_(problem.bodies.size(), Vector6{}),
         relative_(problem.contact_count()),
         relative_way_(problem.contact_count()),
         turning_(problem.pairs.size()),
@@ -194,7 +249,7 @@ class ConvexContacts {
                 std::uint32_t& factorisations) {
     while (true) {
       find_gradient(goal, y, impulse);
-      if (gradient_.norm() <= flat_below(goal, y)) return true;
+      if (size_of_gradient() <= flat_below(goal, y)) return true;
       if (factorisations == 0) return false;
       --factorisations;
       find_curvature(goal);
@@ -210,7 +265,7 @@ class ConvexContacts {
   double turning_softness(std::size_t pair) const { return turning_softness_[pair]; }
 
   // The velocities of a contact but for its drive.
-  Vector3d relative(std::size_t contact, const std::vector<Vector6>& y) const {
+  Vector3 relative(std::size_t contact, const std::vector<Vector6>& y) const {
     return {problem_.along(problem_.normal[contact], contact, y),
             problem_.along(problem_.first[contact], contact, y),
             problem_.along(problem_.second[contact], contact, y)};
@@ -222,59 +277,65 @@ class ConvexContacts {
     constexpr double kFlat = 3e-9;
     double squares = 0;
     for (std::size_t j = 1; j < y.size(); ++j) {
-      squares += (y[j] - goal.free[j]).squaredNorm() + 1e-6 * goal.free[j].squaredNorm();
+      squares += square(y[j] - goal.free[j]) + 1e-6 * square(goal.free[j]);
     }
     return kFlat * std::sqrt(squares);
   }
 
+  double size_of_gradient() const {
+    double squares = 0;
+    for (std::size_t j = 1; j < gradient_.size(); ++j) squares += square(gradient_[j]);
+    return std::sqrt(squares);
+  }
+
   void find_gradient(const ConvexGoal& goal, const std::vector<Vector6>& y, IslandImpulses& impulse) {
-    gradient_.resize(static_cast<Eigen::Index>(6 * (y.size() - 1)));
-    for (std::size_t j = 1; j < y.size(); ++j) gradient_.segment<6>(6 * (j - 1)) = y[j] - goal.free[j];
+    gradient_.resize(y.size());
+    for (std::size_t j = 1; j < y.size(); ++j) gradient_[j] = y[j] - goal.free[j];
     impulse.contact.resize(problem_.contact_count());
     for (std::size_t i = 0; i < problem_.contact_count(); ++i) {
       relative_[i] = relative(i, y) + problem_.drive[i];
       impulse.contact[i] = impulse_at(goal, i, relative_[i]);
-      push(i, problem_.normal[i], impulse.contact[i].x());
-      push(i, problem_.first[i], impulse.contact[i].y());
-      push(i, problem_.second[i], impulse.contact[i].z());
+      push(i, problem_.normal[i], impulse.contact[i].x);
+      push(i, problem_.first[i], impulse.contact[i].y);
+      push(i, problem_.second[i], impulse.contact[i].z);
     }
     impulse.turning.resize(problem_.pairs.size());
     for (std::size_t i = 0; i < problem_.pairs.size(); ++i) {
       const TouchingPair& pair = problem_.pairs[i];
       turning_[i] = problem_.turning(pair, y) + pair.drive;
       impulse.turning[i] = turning_at(goal, i, turning_[i]);
-      for (int k = 0; k < 3; ++k) push(pair.begin, pair.turn[k], impulse.turning[i][k]);
+      for (int k = 0; k < 3; ++k) push(pair.begin, pair.turn[k], at(impulse.turning[i], k));
     }
   }
 
   void push(std::size_t contact, const ContactRow& row, double impulse) {
     const std::uint32_t a = problem_.a[contact], b = problem_.b[contact];
-    if (a > 0) gradient_.segment<6>(6 * (a - 1)) -= impulse * row.a;
-    if (b > 0) gradient_.segment<6>(6 * (b - 1)) -= impulse * row.b;
+    if (a > 0) gradient_[a] -= impulse * row.a;
+    if (b > 0) gradient_[b] -= impulse * row.b;
   }
 
   void find_curvature(const ConvexGoal& goal) {
     matrix_.set_identity();
     for (std::size_t i = 0; i < problem_.contact_count(); ++i) {
       const ContactRow &n = problem_.normal[i], &f = problem_.first[i], &s = problem_.second[i];
-      const double normal = impulse_slope(goal, i, relative_[i], Vector3d::UnitX()).x();
-      const Vector3d first = impulse_slope(goal, i, relative_[i], Vector3d::UnitY());
-      const Vector3d second = impulse_slope(goal, i, relative_[i], Vector3d::UnitZ());
+      const double normal = impulse_slope(goal, i, relative_[i], {1, 0, 0}).x;
+      const Vector3 first = impulse_slope(goal, i, relative_[i], {0, 1, 0});
+      const Vector3 second = impulse_slope(goal, i, relative_[i], {0, 0, 1});
       if (normal > 0) matrix_.add(i, n, n, normal);
       if (goal.bound[i] <= 0) continue;
-      matrix_.add(i, f, f, first.y());
-      matrix_.add(i, s, s, second.z());
-      if (first.z() == 0) continue;
-      matrix_.add(i, f, s, first.z());
-      matrix_.add(i, s, f, first.z());
+      matrix_.add(i, f, f, first.y);
+      matrix_.add(i, s, s, second.z);
+      if (first.z == 0) continue;
+      matrix_.add(i, f, s, first.z);
+      matrix_.add(i, s, f, first.z);
     }
     for (std::size_t i = 0; i < problem_.pairs.size(); ++i) {
       if (goal.turning_bound[i] <= 0) continue;
       const TouchingPair& pair = problem_.pairs[i];
       for (int k = 0; k < 3; ++k) {
-        const Vector3d column = turning_slope(goal, i, turning_[i], Vector3d::Unit(k));
+        const Vector3 column = turning_slope(goal, i, turning_[i], Matrix3::identity().row[k]);
         for (int j = 0; j < 3; ++j) {
-          if (column[j] != 0) matrix_.add(pair.begin, pair.turn[j], pair.turn[k], column[j]);
+          if (at(column, j) != 0) matrix_.add(pair.begin, pair.turn[j], pair.turn[k], at(column, j));
         }
       }
     }
@@ -282,8 +343,8 @@ class ConvexContacts {
 
   bool find_way() {
     if (!matrix_.factorise()) return false;
-    const VectorXd way = matrix_.solve(-gradient_);
-    for (std::size_t j = 1; j < way_.size(); ++j) way_[j] = way.segment<6>(6 * (j - 1));
+    for (std::size_t j = 1; j < way_.size(); ++j) way_[j] = -gradient_[j];
+    matrix_.solve(way_);
     for (std::size_t i = 0; i < problem_.contact_count(); ++i) relative_way_[i] = relative(i, way_);
     for (std::size_t i = 0; i < problem_.pairs.size(); ++i)
       turning_way_[i] = problem_.turning(problem_.pairs[i], way_);
@@ -296,22 +357,22 @@ class ConvexContacts {
     constexpr double kEnough = 1e-3;
     double linear = 0, quadratic = 0, fall = 0;
     for (std::size_t j = 1; j < y.size(); ++j) {
-      linear += (y[j] - goal.free[j]).dot(way_[j]);
-      quadratic += way_[j].squaredNorm();
-      fall -= gradient_.segment<6>(6 * (j - 1)).dot(way_[j]);
+      linear += dot(y[j] - goal.free[j], way_[j]);
+      quadratic += square(way_[j]);
+      fall -= dot(gradient_[j], way_[j]);
     }
     double low = 0, high = 0, length = 1;
     for (int k = 0; k < kMost; ++k) {
       double slope = linear + length * quadratic, curvature = quadratic;
       for (std::size_t i = 0; i < problem_.contact_count(); ++i) {
-        const Vector3d w = relative_[i] + length * relative_way_[i];
-        slope -= impulse_at(goal, i, w).dot(relative_way_[i]);
-        curvature += impulse_slope(goal, i, w, relative_way_[i]).dot(relative_way_[i]);
+        const Vector3 w = relative_[i] + length * relative_way_[i];
+        slope -= dot(impulse_at(goal, i, w), relative_way_[i]);
+        curvature += dot(impulse_slope(goal, i, w, relative_way_[i]), relative_way_[i]);
       }
       for (std::size_t i = 0; i < problem_.pairs.size(); ++i) {
-        const Vector3d w = turning_[i] + length * turning_way_[i];
-        slope -= turning_at(goal, i, w).dot(turning_way_[i]);
-        curvature += turning_slope(goal, i, w, turning_way_[i]).dot(turning_way_[i]);
+        const Vector3 w = turning_[i] + length * turning_way_[i];
+        slope -= dot(turning_at(goal, i, w), turning_way_[i]);
+        curvature += dot(turning_slope(goal, i, w, turning_way_[i]), turning_way_[i]);
       }
       if (std::fabs(slope) <= kEnough * fall) return length;
       (slope > 0 ? high : low) = length;
@@ -322,49 +383,49 @@ class ConvexContacts {
     return low > 0 ? low : length;
   }
 
-  Vector2d wanted_friction(const ConvexGoal& goal, std::size_t i, const Vector3d& w) const {
-    return goal.impulse.contact[i].tail<2>() - w.tail<2>() / friction_softness_[i];
+  Vector2 wanted_friction(const ConvexGoal& goal, std::size_t i, const Vector3& w) const {
+    return across(goal.impulse.contact[i]) - (1 / friction_softness_[i]) * across(w);
   }
 
-  Vector3d wanted_turning(const ConvexGoal& goal, std::size_t i, const Vector3d& w) const {
+  Vector3 wanted_turning(const ConvexGoal& goal, std::size_t i, const Vector3& w) const {
     return goal.impulse.turning[i] - w / turning_softness_[i];
   }
 
-  Vector3d turning_at(const ConvexGoal& goal, std::size_t i, const Vector3d& w) const {
+  Vector3 turning_at(const ConvexGoal& goal, std::size_t i, const Vector3& w) const {
     return shortened(wanted_turning(goal, i, w), goal.turning_bound[i]);
   }
 
   // Returns the slope of a turning impulse, as impulse_slope() does of an impulse.
-  Vector3d turning_slope(const ConvexGoal& goal, std::size_t i, const Vector3d& w,
-                         const Vector3d& change) const {
-    return shortened_change<Vector3d>(wanted_turning(goal, i, w), goal.turning_bound[i],
-                                      change / turning_softness_[i]);
+  Vector3 turning_slope(const ConvexGoal& goal, std::size_t i, const Vector3& w,
+                        const Vector3& change) const {
+    return shortened_change<Vector3>(wanted_turning(goal, i, w), goal.turning_bound[i],
+                                     change / turning_softness_[i]);
   }
 
-  Vector3d impulse_at(const ConvexGoal& goal, std::size_t i, const Vector3d& w) const {
+  Vector3 impulse_at(const ConvexGoal& goal, std::size_t i, const Vector3& w) const {
     const double normal =
-        std::max(0.0, goal.impulse.contact[i].x() + (goal.target[i] - w.x()) / normal_softness_[i]);
-    const Vector2d friction = shortened(wanted_friction(goal, i, w), goal.bound[i]);
-    return {normal, friction.x(), friction.y()};
+        std::max(0.0, goal.impulse.contact[i].x + (goal.target[i] - w.x) / normal_softness_[i]);
+    const Vector2 friction = shortened(wanted_friction(goal, i, w), goal.bound[i]);
+    return {normal, friction.x, friction.y};
   }
 
   // The derivative of the impulse along a change of w, less its sign.
-  Vector3d impulse_slope(const ConvexGoal& goal, std::size_t i, const Vector3d& w,
-                         const Vector3d& change) const {
-    const bool pushes = goal.impulse.contact[i].x() + (goal.target[i] - w.x()) / normal_softness_[i] > 0;
-    const Vector2d slope = shortened_change<Vector2d>(wanted_friction(goal, i, w), goal.bound[i],
-                                                      change.tail<2>() / friction_softness_[i]);
-    return {pushes ? change.x() / normal_softness_[i] : 0, slope.x(), slope.y()};
+  Vector3 impulse_slope(const ConvexGoal& goal, std::size_t i, const Vector3& w,
+                        const Vector3& change) const {
+    const bool pushes = goal.impulse.contact[i].x + (goal.target[i] - w.x) / normal_softness_[i] > 0;
+    const Vector2 slope = shortened_change<Vector2>(wanted_friction(goal, i, w), goal.bound[i],
+                                                    (1 / friction_softness_[i]) * across(change));
+    return {pushes ? change.x / normal_softness_[i] : 0, slope.x, slope.y};
   }
 
   const IslandProblem& problem_;
   BlockMatrix matrix_;
   std::vector<double> normal_softness_, friction_softness_, turning_softness_;
-  VectorXd gradient_;
+  std::vector<Vector6> gradient_;
   std::vector<Vector6> way_;  // of a Newton step
-  std::vector<Vector3d> relative_,
-      relative_way_;                             // velocities of contacts, and how the way changes them
-  std::vector<Vector3d> turning_, turning_way_;  // of pairs
+  std::vector<Vector3> relative_,
+      relative_way_;                            // velocities of contacts, and how the way changes them
+  std::vector<Vector3> turning_, turning_way_;  // of pairs
 };
 
 constexpr int kMostPasses = 30;
@@ -409,12 +470,25 @@ class NewtonStep {
     for (std::size_t j = 1; j < goal.free.size(); ++j) goal.free[j] += input_.dt * problem_.gravity[j];
     for (std::size_t i = 0; i < problem_.contact_count(); ++i) {
       const double gap = std::max(0.0, problem_.separation[i]);
-      goal.target.push_back(problem_.rebound[i] > 0 ? problem_.rebound[i] : -gap / input_.dt);
+      goal.target.push_back(problem_.rebound[i] > 0 ? rebound_at_end(i, gap) : -gap / input_.dt);
     }
     IslandImpulses before = {problem_.impulse, {}};
     for (const TouchingPair& pair : problem_.pairs) before.turning.push_back(pair.impulse);
     take_impulses(goal, before);
     return goal;
+  }
+
+  // The velocity along a normal at the end of a step in which a gap closes and the bodies bounce. The
+  // displacement is that of the mean velocity, so the gap that it leaves is as high as they have risen by
+  // then, and has its part of the energy.
+  double rebound_at_end(std::size_t i, double gap) const {
+    const double rebound = problem_.rebound[i], dt = input_.dt;
+    const double fall = -problem_.along(problem_.normal[i], i, problem_.gravity);
+    const double approach = -problem_.along(problem_.normal[i], i, problem_.velocity) - problem_.drive[i].x;
+    const double half = 0.5 * fall * dt;
+    const double square = half * half - fall * (2 * gap - approach * dt) + rebound * rebound;
+    const double velocity = std::sqrt(std::max(0.0, square)) - half;
+    return gap + 0.5 * dt * (velocity - approach) > 0 ? velocity : rebound;
   }
 
   void take_impulses(ConvexGoal& goal, const IslandImpulses& impulses) const {
@@ -427,13 +501,13 @@ class NewtonStep {
   }
 
   double friction_bound(const IslandImpulses& impulses, std::size_t contact) const {
-    return options_.friction * impulses.contact[contact].x();
+    return options_.friction * impulses.contact[contact].x;
   }
 
   double turning_bound(const IslandImpulses& impulses, std::size_t pair) const {
     double push = 0;
     for (std::uint32_t i = problem_.pairs[pair].begin; i < problem_.pairs[pair].end; ++i)
-      push += impulses.contact[i].x();
+      push += impulses.contact[i].x;
     return options_.rolling_resistance * push;
   }
 
@@ -441,22 +515,22 @@ class NewtonStep {
     constexpr double kOfGravity = 1e-4, kOfApproach = 1e-6;
     double approach = 0;
     for (std::size_t i = 0; i < problem_.contact_count(); ++i) {
-      const Vector3d w = contacts_.relative(i, problem_.velocity) + problem_.drive[i];
-      approach = std::max(approach, w.norm());
+      const Vector3 w = contacts_.relative(i, problem_.velocity) + problem_.drive[i];
+      approach = std::max(approach, norm(w));
     }
-    return kOfGravity * input_.dt * input_.gravity.norm() + kOfApproach * approach;
+    return kOfGravity * input_.dt * norm(input_.gravity) + kOfApproach * approach;
   }
 
   // Returns by how much another pass would change velocities of contacts.
   double next_change(const ConvexGoal& goal) const {
     double change = 0;
     for (std::size_t i = 0; i < problem_.contact_count(); ++i) {
-      const Vector3d step = impulse_.contact[i] - goal.impulse.contact[i];
+      const Vector3 step = impulse_.contact[i] - goal.impulse.contact[i];
       const double bound = friction_bound(impulse_, i);
-      const double friction = impulse_.contact[i].tail<2>().norm();
+      const double friction = norm(across(impulse_.contact[i]));
       const bool slips = friction >= (1 - 1e-9) * std::min(bound, goal.bound[i]);
-      change = std::max({change, contacts_.normal_softness(i) * std::fabs(step.x()),
-                         contacts_.friction_softness(i) * step.tail<2>().norm(),
+      change = std::max({change, contacts_.normal_softness(i) * std::fabs(step.x),
+                         contacts_.friction_softness(i) * norm(across(step)),
                          slips ? problem_.friction_mobility(i) * std::fabs(bound - goal.bound[i]) : 0.0});
     }
     return std::max(change, next_change_of_turning(goal));
@@ -470,8 +544,8 @@ class NewtonStep {
       const TouchingPair& pair = problem_.pairs[i];
       const double arm = std::sqrt(problem_.friction_mobility(pair.begin) / pair.mobility);
       const double bound = turning_bound(impulse_, i);
-      const bool turns = impulse_.turning[i].norm() >= (1 - 1e-9) * std::min(bound, goal.turning_bound[i]);
-      const double step = (impulse_.turning[i] - goal.impulse.turning[i]).norm();
+      const bool turns = norm(impulse_.turning[i]) >= (1 - 1e-9) * std::min(bound, goal.turning_bound[i]);
+      const double step = norm(impulse_.turning[i] - goal.impulse.turning[i]);
       change = std::max({change, arm * contacts_.turning_softness(i) * step,
                          turns ? arm * pair.mobility * std::fabs(bound - goal.turning_bound[i]) : 0.0});
     }
@@ -486,8 +560,8 @@ class NewtonStep {
     for (std::size_t j = 1; j < goal.free.size(); ++j) goal.free[j] = 0.5 * (goal.free[j] + end_[j]);
     for (const double s : problem_.separation)
       goal.target.push_back(-(s < 0 ? options_.correction : 1) * s / input_.dt);
-    goal.impulse = {std::vector<Vector3d>(problem_.contact_count(), Vector3d::Zero()),
-                    std::vector<Vector3d>(problem_.pairs.size(), Vector3d::Zero())};
+    goal.impulse = {std::vector<Vector3>(problem_.contact_count(), Vector3{}),
+                    std::vector<Vector3>(problem_.pairs.size(), Vector3{})};
     goal.bound.assign(problem_.contact_count(), 0);
     goal.turning_bound.assign(problem_.pairs.size(), 0);
     mean_ = goal.free;
@@ -514,4 +588,4 @@ std::optional<Residual> solve_newton_step(IslandProblem& problem, const StepInpu
   return step.write(problem);
 }
 
-}  // namespace tandem::simulation
+}  // namespace tandem::dynamics

@@ -1,12 +1,12 @@
-#include "islands.h"
+#include "dynamics/islands.h"
 
 #include <algorithm>
 #include <limits>
 #include <numeric>
 
-#include "common/union_find.h"
+#include "kernels/common/union_find.h"
 
-namespace tandem::simulation {
+namespace tandem::dynamics {
 namespace {
 
 constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
@@ -117,15 +117,15 @@ void Sleep::fall_asleep(std::span<const BodyProperties> bodies, std::span<BodySt
     const auto members = islands.bodies_of(island);
     bool all = !islands.contacts_of(island).empty();  // what flies does not sleep
     for (const std::uint32_t i : members) {
-      const double speed = states[i].velocity.norm() + bodies[i].radius * states[i].angular_velocity.norm();
+      const double speed = norm(states[i].velocity) + bodies[i].radius * norm(states[i].angular_velocity);
       quiet_[i] = speed <= options.speed ? quiet_[i] + dt : 0;
       all = all && quiet_[i] >= options.delay;
     }
     if (!all) continue;
     for (const std::uint32_t i : members) {
       group_[i] = members.front();
-      states[i].velocity.setZero();
-      states[i].angular_velocity.setZero();
+      states[i].velocity = {};
+      states[i].angular_velocity = {};
     }
   }
 }
@@ -139,4 +139,4 @@ void Sleep::restore(std::vector<double> quiet, std::vector<std::uint32_t> groups
   group_ = std::move(groups);
 }
 
-}  // namespace tandem::simulation
+}  // namespace tandem::dynamics

@@ -1,14 +1,12 @@
-#include "mass_properties.h"
-
-#include <Eigen/Dense>
+#include "dynamics/mass_properties.h"
 
 #include <algorithm>
 #include <stdexcept>
 #include <tuple>
 
-#include "common/union_find.h"
+#include "kernels/common/union_find.h"
 
-namespace tandem::simulation {
+namespace tandem::dynamics {
 namespace {
 
 /// The surface of a level: how its triangles hang together, and what is amiss with it.
@@ -119,9 +117,6 @@ Surface make_surface(const LevelView& level) {
   return surface;
 }
 
-using Eigen::Matrix3d;
-using Eigen::Vector3d;
-
 // A volume below this part of the diagonal's cube is rounding.
 constexpr double kFlatVolume = 1e-13;
 
@@ -134,7 +129,7 @@ class Sum {
   void add(const Value& value) {
     const Value next = sum_ + value;
     const Value rest = next - sum_;
-    lost_ += (sum_ - (next - rest)) + (value - rest);
+    lost_ = lost_ + ((sum_ - (next - rest)) + (value - rest));
     sum_ = next;
   }
   Value value() const { return sum_ + lost_; }
@@ -146,53 +141,48 @@ class Sum {
 // Integrals of 1, x and x x^T over a body or a surface.
 struct Moments {
   double zeroth;
-  Vector3d first;
-  Matrix3d second;
+  Vector3 first;
+  Matrix3 second;
 };
 
-Matrix3d product(const Vector3d& x) {
-  return x * x.transpose();
+Matrix3 product(const Vector3& x) {
+  return outer(x, x);
 }
 
 // Returns the moments of the tetrahedron between the origin and a triangle. They are exact, since a
 // polynomial of degree 2 over a simplex is a mean over its corners and their sum (Eberly 2002, "Polyhedral
 // mass properties", gives the same).
-Moments solid_moments(const Vector3d& p, const Vector3d& q, const Vector3d& r) {
-  const double volume = p.dot(q.cross(r)) / 6;
-  const Vector3d sum = p + q + r;
+Moments solid_moments(const Vector3& p, const Vector3& q, const Vector3& r) {
+  const double volume = dot(p, cross(q, r)) / 6;
+  const Vector3 sum = p + q + r;
   return {volume, volume / 4 * sum, volume / 20 * (product(p) + product(q) + product(r) + product(sum))};
 }
 
 // Returns the moments of the triangle itself.
-Moments shell_moments(const Vector3d& p, const Vector3d& q, const Vector3d& r) {
-  const double area = (q - p).cross(r - p).norm() / 2;
-  const Vector3d sum = p + q + r;
+Moments shell_moments(const Vector3& p, const Vector3& q, const Vector3& r) {
+  const double area = norm(cross(q - p, r - p)) / 2;
+  const Vector3 sum = p + q + r;
   return {area, area / 3 * sum, area / 12 * (product(p) + product(q) + product(r) + product(sum))};
 }
 
 // The middle of the bounds: what integrals are taken about, so that nothing large cancels.
-Vector3d middle(const FileHeader& header) {
-  const Vector3d lower(header.lower[0], header.lower[1], header.lower[2]);
-  const Vector3d upper(header.upper[0], header.upper[1], header.upper[2]);
-  return (lower + upper) / 2;
+Vector3 middle(const FileHeader& header) {
+  return (vector_of(header.lower) + vector_of(header.upper)) / 2;
 }
 
 double diagonal(const FileHeader& header) {
-  Vector3d extent;
-  for (int k = 0; k < 3; ++k) extent[k] = static_cast<double>(header.upper[k]) - header.lower[k];
-  return extent.norm();
+  return norm(vector_of(header.upper) - vector_of(header.lower));
 }
 
 template <typename Of>
-Moments integrate(const Surface& surface, const Vector3d& about, const Of& of) {
+Moments integrate(const Surface& surface, const Vector3& about, const Of& of) {
   Sum<double> zeroth(0);
-  Sum<Vector3d> first(Vector3d::Zero());
-  Sum<Matrix3d> second(Matrix3d::Zero());
+  Sum<Vector3> first(Vector3{});
+  Sum<Matrix3> second(Matrix3{});
   for (std::uint32_t t = 0; t < surface.level.triangle_count; ++t) {
-    Vector3d x[3];
+    Vector3 x[3];
     for (int k = 0; k < 3; ++k) {
-      const float* position = surface.level.triangles[t].corner[k].position;
-      x[k] = Vector3d(position[0], position[1], position[2]) - about;
+      x[k] = vector_of(surface.level.triangles[t].corner[k].position) - about;
     }
     if (is_turned(surface.level.topology[t].flags)) std::swap(x[1], x[2]);
     const Moments part = of(x[0], x[1], x[2]);
@@ -204,14 +194,14 @@ Moments integrate(const Surface& surface, const Vector3d& about, const Of& of) {
 }
 
 // thickness: what a mass per area is multiplied by; 1 of solids.
-MassProperties properties_of(const Moments& moments, const Vector3d& about, const double* origin,
+MassProperties properties_of(const Moments& moments, const Vector3& about, const double* origin,
                              double thickness) {
-  const Vector3d centre = moments.first / moments.zeroth;
-  const Matrix3d spread = thickness * (moments.second - moments.zeroth * product(centre));
+  const Vector3 centre = moments.first / moments.zeroth;
+  const Matrix3 spread = thickness * (moments.second - moments.zeroth * product(centre));
   MassProperties properties;
   properties.volume = thickness * moments.zeroth;
-  properties.centre = Vector3d(origin[0], origin[1], origin[2]) + (about + centre);
-  properties.inertia_per_density = spread.trace() * Matrix3d::Identity() - spread;
+  properties.centre = Vector3{origin[0], origin[1], origin[2]} + (about + centre);
+  properties.inertia_per_density = trace(spread) * Matrix3::identity() - spread;
   return properties;
 }
 
@@ -248,7 +238,7 @@ void add_findings(const Surface& surface, std::vector<std::string>& findings) {
 MassReport mass_properties(const AssetView& asset) {
   const Surface surface = make_surface(asset.level());
   const FileHeader& header = *asset.header;
-  const Vector3d about = middle(header);
+  const Vector3 about = middle(header);
   const double size = diagonal(header);
   MassReport report = {{}, MassModel::solid, surface.level.component_count, {}};
   add_findings(surface, report.findings);
@@ -268,4 +258,15 @@ MassReport mass_properties(const AssetView& asset) {
   return report;
 }
 
-}  // namespace tandem::simulation
+double radius_about(const Vector3& centre, const AssetView& asset) {
+  const LevelView level = asset.level();
+  const Vector3 from = centre - vector_of(asset.header->origin);
+  double most = 0;
+  for (const Triangle& triangle : std::span(level.triangles, level.triangle_count)) {
+    for (const Triangle::Corner& corner : triangle.corner)
+      most = std::max(most, square(vector_of(corner.position) - from));
+  }
+  return std::sqrt(most);
+}
+
+}  // namespace tandem::dynamics

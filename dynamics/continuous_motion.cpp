@@ -1,15 +1,10 @@
-#include "continuous_motion.h"
+#include "dynamics/continuous_motion.h"
 
 #include <algorithm>
 #include <cmath>
-#include <new>
 
-namespace tandem::simulation {
+namespace tandem::dynamics {
 namespace {
-
-using Eigen::AngleAxisd;
-using Eigen::Quaterniond;
-using Eigen::Vector3d;
 
 // A pair goes on beyond its impact, or deeper than it is, by at most this part of the thinner body's inner
 // radius.
@@ -35,23 +30,8 @@ double inner_radius_of(const AssetView& shape) {
   return least;
 }
 
-// The shortest rotation from one orientation to another, as an axis times an angle.
-Vector3d turn_between(const Quaterniond& from, const Quaterniond& to) {
-  const AngleAxisd turn(to * from.conjugate());
-  return turn.angle() * turn.axis();
-}
-
-Quaterniond turned(const Quaterniond& orientation, const Vector3d& turn) {
-  const double angle = turn.norm();
-  if (angle == 0) return orientation;
-  return (Quaterniond(AngleAxisd(angle, turn / angle)) * orientation).normalized();
-}
-
-void require(Status status, const Scene& scene) {
-  if (status == Status::kOutOfMemory) throw std::bad_alloc();
-  if (status == Status::kOk) return;
-  const std::string blamed = subject(status) == nullptr ? "" : "body " + std::to_string(scene.where()) + ": ";
-  throw EngineError("continuous motion: " + blamed + explain(status), status, scene.where());
+Quaternion turned(const Quaternion& orientation, const Vector3& turn) {
+  return normalized(rotation_by(turn) * orientation);
 }
 
 }  // namespace
@@ -78,11 +58,12 @@ bool ContinuousMotion::find_fast(std::span<const BodyProperties> bodies, std::sp
     way_[i] = after[i].position - before[i].position;
     turn_[i] = turn_between(before[i].orientation, after[i].orientation);
     if (bodies[i].motion == Motion::fixed) continue;
-    if (way_[i].norm() + bodies[i].radius * turn_[i].norm() <= kFast * thinnest) continue;
+    if (norm(way_[i]) + bodies[i].radius * norm(turn_[i]) <= kFast * thinnest) continue;
     fast_[i] = Motion::moving;
     any = true;
   }
   part_.assign(bodies.size(), 1);
+  held_.assign(bodies.size(), 1);
   return any;
 }
 
@@ -90,15 +71,16 @@ bool ContinuousMotion::find_fast(std::span<const BodyProperties> bodies, std::sp
 // where they barely touch. reach: how much farther they may go, a length.
 double ContinuousMotion::stop_of(const Impact& impact, const ObjectPair& pair, double reach,
                                  double slop) const {
-  const Vector3d at_a(impact.point_a), at_b(impact.point_b);
-  const auto velocity = [&](std::uint32_t body, const Vector3d& at) {
+  const Vector3 at_a = vector_of(impact.point_a), at_b = vector_of(impact.point_b);
+  const auto velocity = [&](std::uint32_t body, const Vector3& at) {
     const RigidMotion& motion = motion_[body];
-    const Vector3d v(motion.velocity), w(motion.angular_velocity), c(motion.centre);
-    return Vector3d(v + w.cross(at - (c + impact.t_safe * v)));
+    const Vector3 v = vector_of(motion.velocity), w = vector_of(motion.angular_velocity),
+                  c = vector_of(motion.centre);
+    return v + cross(w, at - (c + impact.t_safe * v));
   };
-  const Vector3d approach = velocity(pair.a, at_a) - velocity(pair.b, at_b), apart = at_b - at_a;
-  const double closing = apart.norm() > 0 ? approach.dot(apart.normalized()) : approach.norm();
-  double beyond = reach / approach.norm();
+  const Vector3 approach = velocity(pair.a, at_a) - velocity(pair.b, at_b), apart = at_b - at_a;
+  const double closing = norm(apart) > 0 ? dot(approach, normalized(apart)) : norm(approach);
+  double beyond = reach / norm(approach);
   if (closing > 0) beyond = std::min(beyond, (impact.gap + slop) / closing);
   return std::min(1.0, impact.t_safe + beyond);
 }
@@ -130,10 +112,10 @@ double ContinuousMotion::stop_of_touching(std::span<const BodyProperties> bodies
                                           std::span<const BodyState> before, const ObjectPair& pair,
                                           double reach, double slop) {
   const auto turned_by = [&](std::uint32_t body) {
-    return bodies[body].motion == Motion::fixed ? 0 : part_[body] * bodies[body].radius * turn_[body].norm();
+    return bodies[body].motion == Motion::fixed ? 0 : part_[body] * bodies[body].radius * norm(turn_[body]);
   };
-  const Vector3d way = part_[pair.a] * way_[pair.a] - part_[pair.b] * way_[pair.b];
-  const double samples = std::ceil((way.norm() + turned_by(pair.a) + turned_by(pair.b)) / reach);
+  const Vector3 way = part_[pair.a] * way_[pair.a] - part_[pair.b] * way_[pair.b];
+  const double samples = std::ceil((norm(way) + turned_by(pair.a) + turned_by(pair.b)) / reach);
   const double most = std::max(depth_at(bodies, before, pair, 0), slop) + reach;
   for (double i = 1; i <= std::min(samples, kMostSamples); ++i) {
     if (depth_at(bodies, before, pair, i / samples) > most) return (i - 1) / samples;
@@ -148,11 +130,11 @@ bool ContinuousMotion::stop(std::span<const BodyProperties> bodies, std::span<co
   motion_.resize(bodies.size());
   for (std::size_t i = 0; i < bodies.size(); ++i) {
     instances_[i] = pose_of(bodies[i], before[i]);
-    const Vector3d way = part_[i] * way_[i], turn = part_[i] * turn_[i];
+    const Vector3 way = part_[i] * way_[i], turn = part_[i] * turn_[i];
     for (int k = 0; k < 3; ++k) {
-      motion_[i].velocity[k] = way[k];
-      motion_[i].angular_velocity[k] = turn[k];
-      motion_[i].centre[k] = before[i].position[k];
+      motion_[i].velocity[k] = at(way, k);
+      motion_[i].angular_velocity[k] = at(turn, k);
+      motion_[i].centre[k] = at(before[i].position, k);
     }
   }
   filter_.motion = fast_.data();
@@ -171,7 +153,9 @@ bool ContinuousMotion::stop(std::span<const BodyProperties> bodies, std::span<co
                             : stop_of_touching(bodies, before, pair, reach, slop);
     if (part > 1 - 1e-9) continue;
     for (const std::uint32_t body : {pair.a, pair.b}) {
-      if (bodies[body].motion == Motion::moving) stop_[body] = std::min(stop_[body], part);
+      if (bodies[body].motion != Motion::moving) continue;
+      stop_[body] = std::min(stop_[body], part);
+      if (impact.status != ImpactStatus::found) held_[body] = std::min(held_[body], part);
     }
     earlier = true;
   }
@@ -188,7 +172,12 @@ void ContinuousMotion::limit(std::span<const BodyProperties> bodies, std::span<c
     if (part_[i] == 1) continue;
     after[i].position = before[i].position + part_[i] * way_[i];
     after[i].orientation = turned(before[i].orientation, part_[i] * turn_[i]);
+    const auto at_impact = [&](const Vector3& from, const Vector3& to) {
+      return held_[i] * (from + part_[i] * (to - from));
+    };
+    after[i].velocity = at_impact(before[i].velocity, after[i].velocity);
+    after[i].angular_velocity = at_impact(before[i].angular_velocity, after[i].angular_velocity);
   }
 }
 
-}  // namespace tandem::simulation
+}  // namespace tandem::dynamics

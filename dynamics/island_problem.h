@@ -1,5 +1,4 @@
 #pragma once
-#include <Eigen/Core>
 
 #include <algorithm>
 #include <array>
@@ -8,11 +7,9 @@
 #include <span>
 #include <vector>
 
-#include "step_solver.h"
+#include "dynamics/step_solver.h"
 
-namespace tandem::simulation {
-
-using Vector6 = Eigen::Matrix<double, 6, 1>;
+namespace tandem::dynamics {
 
 /// A direction of a contact as two gradients: w = a . y_a + b . y_b + drive. An impulse of 1 adds a to y_a
 /// and b to y_b.
@@ -20,30 +17,30 @@ struct ContactRow {
   Vector6 a, b;
 
   /// Returns by how much an impulse of 1 changes w.
-  double mobility() const { return a.squaredNorm() + b.squaredNorm(); }
+  double mobility() const { return square(a) + square(b); }
 };
 
 /// Turns velocities of a body into those in which its mass is 1: y = (sqrt(m) v, F^-1 spin), where F F^T is
 /// the inverse of the inertia. Kinetic energy is |y|^2 / 2.
 struct MassScale {
   double root_mass;
-  Eigen::Matrix3d spread;  ///< F
+  Matrix3 spread;  ///< F
 };
 
 /// Two bodies that touch, and how b turns against a.
 struct TouchingPair {
   std::uint32_t begin, end;        ///< of their contacts
   std::array<ContactRow, 3> turn;  ///< about the axes of the world
-  Eigen::Vector3d drive;           ///< of turn
+  Vector3 drive;                   ///< of turn
   double mobility;                 ///< an impulse of 1 about any axis changes turn by no more
-  Eigen::Vector3d impulse;         ///< against turning, as a whole step would need it
+  Vector3 impulse;                 ///< against turning, as a whole step would need it
 
   /// Return what the impulse adds to the y of its bodies.
-  Vector6 change_of_a(const Eigen::Vector3d& by) const {
-    return by.x() * turn[0].a + by.y() * turn[1].a + by.z() * turn[2].a;
+  Vector6 change_of_a(const Vector3& by) const {
+    return by.x * turn[0].a + by.y * turn[1].a + by.z * turn[2].a;
   }
-  Vector6 change_of_b(const Eigen::Vector3d& by) const {
-    return by.x() * turn[0].b + by.y() * turn[1].b + by.z() * turn[2].b;
+  Vector6 change_of_b(const Vector3& by) const {
+    return by.x * turn[0].b + by.y * turn[1].b + by.z * turn[2].b;
   }
 };
 
@@ -58,20 +55,20 @@ struct IslandProblem {
 
   std::vector<std::uint32_t> contacts, a, b;
   std::vector<ContactRow> normal, first, second;  ///< the latter two across the normal
-  std::vector<Eigen::Vector3d> first_direction, second_direction;
-  std::vector<Eigen::Vector3d> drive;    ///< of normal, first, second: by bodies that move and are not moved
-  std::vector<double> separation;        ///< of a gap; else the slop less the depth, at most 0
-  std::vector<double> rebound;           ///< velocity along the normal that restitution asks for, or 0
-  std::vector<Eigen::Vector3d> impulse;  ///< along normal, first, second, as a whole step would need it
+  std::vector<Vector3> first_direction, second_direction;
+  std::vector<Vector3> drive;      ///< of normal, first, second: by bodies that move and are not moved
+  std::vector<double> separation;  ///< of a gap; else the slop less the depth, at most 0
+  std::vector<double> rebound;     ///< velocity along the normal that restitution asks for, or 0
+  std::vector<Vector3> impulse;    ///< along normal, first, second, as a whole step would need it
 
   std::vector<TouchingPair> pairs;
 
   std::size_t contact_count() const { return contacts.size(); }
   double along(const ContactRow& row, std::size_t contact, const std::vector<Vector6>& y) const {
-    return row.a.dot(y[a[contact]]) + row.b.dot(y[b[contact]]);
+    return dot(row.a, y[a[contact]]) + dot(row.b, y[b[contact]]);
   }
   /// Returns by how much b of a pair turns against a, but for what drives them.
-  Eigen::Vector3d turning(const TouchingPair& pair, const std::vector<Vector6>& y) const {
+  Vector3 turning(const TouchingPair& pair, const std::vector<Vector6>& y) const {
     return {along(pair.turn[0], pair.begin, y), along(pair.turn[1], pair.begin, y),
             along(pair.turn[2], pair.begin, y)};
   }
@@ -80,11 +77,11 @@ struct IslandProblem {
     return std::max(first[contact].mobility(), second[contact].mobility());
   }
   /// Return what a contact's impulse adds to the y of its bodies.
-  Vector6 change_of_a(std::size_t contact, const Eigen::Vector3d& by) const {
-    return by.x() * normal[contact].a + by.y() * first[contact].a + by.z() * second[contact].a;
+  Vector6 change_of_a(std::size_t contact, const Vector3& by) const {
+    return by.x * normal[contact].a + by.y * first[contact].a + by.z * second[contact].a;
   }
-  Vector6 change_of_b(std::size_t contact, const Eigen::Vector3d& by) const {
-    return by.x() * normal[contact].b + by.y() * first[contact].b + by.z() * second[contact].b;
+  Vector6 change_of_b(std::size_t contact, const Vector3& by) const {
+    return by.x * normal[contact].b + by.y * first[contact].b + by.z * second[contact].b;
   }
 };
 
@@ -99,8 +96,8 @@ struct StepStart {
   std::span<const ContactImpulse> impulses;
 };
 
-/// The contacts come by ascending layer of their lower body (find_layers()), so that a sweep goes up from the
-/// ground. place: for each body of the step a number that this may change.
+/// Bodies and contacts come by ascending layer (find_layers()), these of their lower body, so that a sweep
+/// goes up from the ground. place: for each body of the step a number that this may change.
 IslandProblem make_island_problem(const StepInput& input, std::size_t island, const StepStart& start,
                                   const SolverOptions& options, std::span<const std::uint32_t> layers,
                                   std::span<std::uint32_t> place);
@@ -137,4 +134,4 @@ Residual solve_soft_step(IslandProblem& problem, const StepInput& input, const S
 std::optional<Residual> solve_newton_step(IslandProblem& problem, const StepInput& input,
                                           const SolverOptions& options);
 
-}  // namespace tandem::simulation
+}  // namespace tandem::dynamics

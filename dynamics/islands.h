@@ -3,9 +3,9 @@
 #include <span>
 #include <vector>
 
-#include "contacts.h"
+#include "dynamics/contact_point.h"
 
-namespace tandem::simulation {
+namespace tandem::dynamics {
 
 /// Bodies that push each other through contacts, and those contacts. Islands share no dynamic body, so they
 /// can be solved side by side.
@@ -70,4 +70,4 @@ class Sleep {
   std::vector<std::uint32_t> group_;  // those that fell asleep together, by the first of them
 };
 
-}  // namespace tandem::simulation
+}  // namespace tandem::dynamics

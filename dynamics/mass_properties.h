@@ -1,19 +1,19 @@
 #pragma once
-#include <Eigen/Core>
 #include <cstddef>
 #include <cstdint>
 #include <string>
 #include <vector>
 
+#include "dynamics/linear.h"
 #include "tandem/formats/view.h"
 
-namespace tandem::simulation {
+namespace tandem::dynamics {
 
 /// The mass of a body of density 1, and how it is spread, in the coordinates of the mesh file.
 struct MassProperties {
-  double volume;                        ///< mass per density
-  Eigen::Vector3d centre;               ///< of mass
-  Eigen::Matrix3d inertia_per_density;  ///< about the centre of mass, along the file's axes
+  double volume;                ///< mass per density
+  Vector3 centre;               ///< of mass
+  Matrix3 inertia_per_density;  ///< about the centre of mass, along the file's axes
 };
 
 /// Says what the mass of a mesh is taken to be.
@@ -42,4 +42,7 @@ struct MassReport {
 /// Throws std::runtime_error where even the shell has no extent.
 MassReport mass_properties(const AssetView& asset);
 
-}  // namespace tandem::simulation
+/// Returns the distance of the farthest vertex from a point in the file's coordinates.
+double radius_about(const Vector3& centre, const AssetView& asset);
+
+}  // namespace tandem::dynamics

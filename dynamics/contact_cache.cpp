@@ -1,11 +1,9 @@
-#include "contact_cache.h"
+#include "dynamics/contact_cache.h"
 
 #include <algorithm>
 
-namespace tandem::simulation {
+namespace tandem::dynamics {
 namespace {
-
-using Eigen::Vector3d;
 
 ObjectPair pair_of(const ContactPoint& contact) {
   return {contact.body_a, contact.body_b};
@@ -31,14 +29,14 @@ CachedContact cached(const ContactPoint& contact, std::span<const BodyState> sta
   return {pair_of(contact),
           contact.feature,
           anchor_of(contact, states),
-          states[contact.body_a].orientation.conjugate() * contact.normal,
+          rotated(conjugated(states[contact.body_a].orientation), contact.normal),
           0,
           {}};
 }
 
 // Returns the contact where the bodies have carried it since it was found.
 ContactPoint moved_with_bodies(const CachedContact& entry, std::span<const BodyState> states) {
-  const Vector3d normal = (states[entry.pair.a].orientation * entry.normal_in_a).normalized();
+  const Vector3 normal = normalized(rotated(states[entry.pair.a].orientation, entry.normal_in_a));
   ContactPoint moved = {entry.pair.a, entry.pair.b, {}, normal, 0, entry.feature};
   carry(moved, entry.anchor, states);
   return moved;
@@ -48,9 +46,9 @@ ContactPoint moved_with_bodies(const CachedContact& entry, std::span<const BodyS
 bool is_just_lost(const CachedContact& entry, const ContactPoint& moved, std::span<const BodyState> states,
                   double gap, double near) {
   constexpr std::uint32_t kLife = 8;  // steps; boxes side by side would keep all that ever touched
-  const Vector3d by = into_world(states[entry.pair.b], entry.anchor.in_b) -
-                      into_world(states[entry.pair.a], entry.anchor.in_a);
-  const double across = (by - moved.normal.dot(by) * moved.normal).norm();
+  const Vector3 by = into_world(states[entry.pair.b], entry.anchor.in_b) -
+                     into_world(states[entry.pair.a], entry.anchor.in_a);
+  const double across = norm(by - dot(moved.normal, by) * moved.normal);
   return entry.quiet_steps < kLife && -gap <= moved.depth && moved.depth <= 0 && across <= near;
 }
 
@@ -77,8 +75,8 @@ class PairMatch {
       std::size_t nearest = old_.size();
       double least = reach * reach;
       for (std::size_t j = 0; j < old_.size(); ++j) {
-        const double apart = std::min((old_[j].anchor.in_a - now_[i].anchor.in_a).squaredNorm(),
-                                      (old_[j].anchor.in_b - now_[i].anchor.in_b).squaredNorm());
+        const double apart = std::min(square(old_[j].anchor.in_a - now_[i].anchor.in_a),
+                                      square(old_[j].anchor.in_b - now_[i].anchor.in_b));
         if (!is_taken_[j] && apart < least) least = apart, nearest = j;
       }
       if (nearest < old_.size()) take(i, nearest);
@@ -87,7 +85,7 @@ class PairMatch {
 
   void share_rest() {
     double normal = 0;
-    Vector3d turning = Vector3d::Zero();
+    Vector3 turning;
     for (std::size_t j = 0; j < old_.size(); ++j) {
       if (!is_taken_[j]) normal += old_[j].impulse.normal, turning += old_[j].impulse.turning;
     }
@@ -153,9 +151,7 @@ void ContactCache::renew(std::span<const CachedContact> old, std::span<const Con
   for (const ContactPoint& contact : found) add(cached(contact, states), contact);
   for (CachedContact entry : old) {
     const ContactPoint moved = moved_with_bodies(entry, states);
-    const auto is_near = [&](const ContactPoint& one) {
-      return (one.position - moved.position).norm() <= near;
-    };
+    const auto is_near = [&](const ContactPoint& one) { return norm(one.position - moved.position) <= near; };
     const auto others = std::span(contacts_).subspan(first_contact);
     if (!is_just_lost(entry, moved, states, gap, near) || std::ranges::any_of(others, is_near)) continue;
     entry.impulse = {};
@@ -188,4 +184,4 @@ void ContactCache::remember(std::span<const ContactImpulse> impulses) {
   }
 }
 
-}  // namespace tandem::simulation
+}  // namespace tandem::dynamics

@@ -1,0 +1,92 @@
+#pragma once
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "dynamics/contact_point.h"
+#include "tandem/kernels/contact_query.h"
+#include "tandem/kernels/manifold_query.h"
+#include "tandem/kernels/moved_query.h"
+
+namespace tandem::dynamics {
+
+/// A question about the scene failed, or its bodies are not such as it can be asked about.
+struct QueryFailed {
+  Status status;
+  std::uint64_t where;  ///< the body or pair to blame, as of Scene::where()
+};
+
+/// Throws QueryFailed, or std::bad_alloc, unless the status is kOk.
+void require(Status status, const Scene& scene);
+
+/// Counts what became of pairs of triangles.
+struct ContactStatistics {
+  ManifoldCounters counters;
+  double area = 0;   ///< of all manifolds, seen along their normals
+  double depth = 0;  ///< the largest
+};
+
+/// The points of manifolds, by ascending pair of bodies. pairs: those that the manifolds name.
+void take_points(const ManifoldQuery& manifolds, std::span<const ObjectPair> pairs,
+                 std::vector<ContactPoint>& points, ContactStatistics& statistics);
+
+/// Seconds that it took to find contacts.
+struct DetectionTimes {
+  double update = 0;          ///< following the bodies
+  double broad_phase = 0;     ///< pairs of bodies
+  double traversal = 0;       ///< with the triangle tests where these are not told apart
+  double triangle_tests = 0;  ///< 0 where they are part of traversal
+  double transfer = 0;        ///< bringing the answer to the CPU, and sorting it
+  double generation = 0;      ///< making points of triangle pairs
+};
+
+/// Says how contacts were found.
+struct FinderReport {
+  DetectionTimes times;
+  ContactCounters counters;
+  ContactStatistics contacts;
+  std::uint64_t kept_pairs = 0;
+};
+
+/// Says which pairs keep the contacts that they have.
+struct Keeping {
+  std::span<const ObjectPair> remembered;  ///< whose contacts the caller remembers, ascending
+  double tolerance;  ///< a pair keeps them until it has moved by more than this, see MovedQuery
+};
+
+/// A simulation has its contacts from one of these.
+class ContactFinder {
+ public:
+  virtual ~ContactFinder() = default;
+
+  /// The contacts of bodies that stand like this, by ascending pair of bodies; those of kept() are left out,
+  /// and those of two idle bodies may be. Valid until the next call. Condition: idle is empty or has an entry
+  /// for each body. Throws QueryFailed, or what an engine throws.
+  virtual const std::vector<ContactPoint>& find(std::span<const Instance> bodies,
+                                                std::span<const std::uint8_t> idle,
+                                                const Keeping& keeping) = 0;
+
+  /// Returns the pairs of the last call that keep the contacts that they had: whose boxes meet, or that were
+  /// remembered. Ascending.
+  std::span<const ObjectPair> kept() const { return kept_; }
+
+  /// Return what the next call takes the motion of pairs from, and let it go on from there.
+  virtual std::span<const PosedBodies> posed() const = 0;
+  virtual void resume(std::span<const PosedBodies> posed) = 0;
+
+  /// Returns the report of the last call.
+  const FinderReport& report() const { return report_; }
+
+ protected:
+  /// Finds the pairs, of those near each other and those remembered, that have moved; kept_ becomes the rest.
+  std::span<const ObjectPair> find_moved(Scene& scene, MovedQuery& moved, std::span<const ObjectPair> near,
+                                         const Keeping& keeping);
+
+  FinderReport report_;
+  std::vector<ObjectPair> kept_;
+
+ private:
+  std::vector<ObjectPair> pairs_;
+};
+
+}  // namespace tandem::dynamics

@@ -1,0 +1,69 @@
+#pragma once
+#include <span>
+#include <vector>
+
+#include "dynamics/contact_finder.h"
+#include "tandem/kernels/distance_query.h"
+
+namespace tandem::dynamics {
+
+/// Finds contacts of bodies that do not touch yet but may within the step, with their gaps, so that the
+/// solver stops them where they meet, and not a step later and deep in each other.
+///
+/// Of a pair that may come together, the nearest points say from where: b is moved this way until it overlaps
+/// a a little, the contact points are those of that pose, and their gaps what b was moved by along their
+/// normals. So two faces that will meet have the points of a patch, and not one.
+class ContactsAhead {
+ public:
+  /// The data that the assets and the filter look at must outlive this. The filter's motions are not looked
+  /// at. Throws QueryFailed.
+  ContactsAhead(std::span<const AssetView> assets, std::uint32_t threads, const PairFilter& filter = {});
+
+  /// Adds the contacts ahead of pairs to those found, so that these still come by ascending pair. Pairs that
+  /// have contacts, that are kept, or of two idle bodies have none. overlap: a length in which contacts are
+  /// told well. The result depends on nothing but the arguments. Throws QueryFailed.
+  void add_to(std::vector<ContactPoint>& found, std::span<const ObjectPair> kept,
+              std::span<const BodyProperties> bodies, std::span<const BodyState> states,
+              std::span<const std::uint8_t> idle, double dt, const Vector3& gravity, double overlap);
+
+ private:
+  /// A pair, how far apart its bodies are at least, and the triangles that were nearest.
+  struct Apart {
+    ObjectPair pair;
+    double distance = 0;
+    std::uint32_t triangle_a = kNoIndex, triangle_b = kNoIndex;
+  };
+  struct Approach {
+    ObjectPair pair;
+    Vector3 way;  ///< of b, until it overlaps a
+  };
+  void follow(std::span<const BodyProperties> bodies, std::span<const BodyState> states);
+  bool is_still(std::uint32_t body) const { return motion_[body] == Motion::fixed; }
+  double turns(const BodyProperties& body, const BodyState& state, std::uint32_t i) const;
+  Vector3 approach_of(const ObjectPair& pair, std::span<const BodyState> states) const;
+  void find_pairs(std::span<const ContactPoint> found, std::span<const ObjectPair> kept,
+                  std::span<const BodyProperties> bodies, std::span<const BodyState> states, double dt,
+                  double fall);
+  void find_approaches(std::span<const BodyProperties> bodies, std::span<const BodyState> states, double dt,
+                       const Vector3& gravity, double overlap);
+  void find_points(std::span<const BodyProperties> bodies, std::span<const BodyState> states);
+
+  PairFilter filter_;
+  Scene scene_, moved_;  // all bodies; two of each approach, moved
+  DistanceQuery distances_;
+  ContactQuery contacts_;
+  ManifoldQuery manifolds_;
+
+  std::vector<BodyState> before_;  // of the last call
+  std::vector<double> way_;        // that points of each body have moved since then, at most
+  std::vector<Apart> apart_, now_apart_;
+  double farthest_ = 0;  // reach of all pairs
+  std::vector<Motion> motion_;
+  std::vector<Instance> instances_;
+  std::vector<ObjectPair> pairs_, moved_pairs_;
+  std::vector<FormerNearest> former_;
+  std::vector<Approach> approaches_;
+  std::vector<ContactPoint> points_;
+};
+
+}  // namespace tandem::dynamics

@@ -1,0 +1,117 @@
+#pragma once
+#include <cstdint>
+#include <memory>
+#include <span>
+
+#include "tandem/kernels/scene.h"
+
+namespace tandem {
+
+/// A body as it enters a world. Lengths are metres, masses kilograms, times seconds, angles radians.
+struct BodyDescription {
+  std::uint32_t asset = 0;    ///< by place in the list given to World::set_assets()
+  Pose pose = kIdentityPose;  ///< of the file's coordinates
+  BodyFilter filter;          ///< its motion, and what it may meet; a sleeping body starts awake
+  double density = 1000;  ///< of a moving body: its mass is that of what the mesh encloses, or of a shell of
+                          ///< 1/100 of its diagonal where it is open
+  double velocity[3] = {};  ///< of its centre of mass; a kinematic body keeps its velocities
+  double angular_velocity[3] = {};
+};
+
+/// Where a body is, and how it moves.
+struct BodyMotion {
+  Pose pose;           ///< of the file's coordinates
+  double centre[3];    ///< of mass, in the world; of a fixed body the origin of its file's coordinates
+  double velocity[3];  ///< of the centre
+  double angular_velocity[3];  ///< in the world
+  bool sleeps;  ///< it rests with all that it touches, and is not looked at until it is touched
+};
+
+/// A point where two bodies touch, or nearly so, and what they did there in the last step.
+struct WorldContact {
+  std::uint32_t a, b;  ///< bodies, a < b
+  double position[3];
+  double normal[3];   ///< unit, from a towards b
+  double depth;       ///< along the normal; less than 0 of a gap
+  double impulse[3];  ///< on b, friction included; on a the opposite one. Newton seconds
+};
+
+struct WorldOptions {
+  double gravity[3] = {0, 0, -9.81};
+  double friction = 0.5;   ///< Coulomb's coefficient
+  double restitution = 0;  ///< part of the speed that an impact gives back, 0 to 1
+  double slop = -1;        ///< overlap that is left alone; less than 0: 1/4000 of the least diagonal of
+                           ///< an asset of a moving body
+  double rolling_resistance = -1;  ///< lever at which the force between two bodies resists that they turn
+                                   ///< against each other; less than 0: 16 slops
+  std::uint32_t substeps = 16;     ///< parts of a step that share its contacts, from 1 to 10,000
+  bool sleeping = true;            ///< bodies that rest with all that they touch are left alone
+  bool continuous = false;         ///< fast bodies are carried to where they first meet others
+  std::uint32_t threads = 1;       ///< from 1 to kMostSceneThreads; no result depends on it
+};
+
+/// Rigid bodies of meshes that move under gravity and contacts. Contacts are those of ContactQuery and
+/// ManifoldQuery, exact for any mesh; docs/dynamics.md says how they are solved and what holds. Throws
+/// nothing. Movable, not copyable. One call at a time; several worlds may be used side by side. The same
+/// calls give the same bytes, for any number of threads.
+class World {
+ public:
+  World();
+  World(World&&) noexcept;
+  World& operator=(World&&) noexcept;
+  ~World();
+
+  /// Names the assets that bodies refer to. What the views look at must outlive the world's use. There are no
+  /// bodies afterwards. Result: as of Scene::set_assets().
+  Status set_assets(std::span<const AssetView> assets);
+
+  /// Places all bodies anew, at time 0. excluded: pairs that are not to meet. Result: kOk; as of
+  /// Scene::place(), and where() is the body; kOutOfRange where a velocity is not finite; kNoTopology where
+  /// its mesh has none, and kNoMass where it has no extent or the density is not positive, of a moving body;
+  /// kBadOption, where where() is 0: an option is out of its range; kOutOfMemory. After an error there are no
+  /// bodies.
+  Status set_bodies(std::span<const BodyDescription> bodies, const WorldOptions& options = {},
+                    std::span<const ObjectPair> excluded = {});
+
+  /// Makes steps of dt seconds. Result: kOk; kBadDuration where dt is not more than 0 or more than 1000;
+  /// kOutOfRange where a body has left the range of numbers that questions take, and where() is the body;
+  /// kOutOfMemory. After an error bodies are as after the last step that was whole.
+  Status step(double dt, std::uint32_t steps = 1);
+
+  /// The bodies as they are now. Valid until the next call.
+  std::span<const BodyMotion> bodies() const;
+
+  /// The contacts that the last step solved, by ascending pair of bodies; not those of two sleeping bodies.
+  /// Valid until the next call.
+  std::span<const WorldContact> contacts() const;
+
+  /// Returns the seconds of all steps since set_bodies().
+  double time() const;
+
+  /// Returns the body's mass; 0 of one that contacts do not move.
+  double mass_of(std::uint32_t body) const;
+
+  /// Puts a body elsewhere or gives it other velocities, and wakes it; `sleeps` and `centre` are not looked
+  /// at. Result: kOk; kUnknownInstance; kPoseNotRigid; kOutOfRange where a number is not finite.
+  Status set(std::uint32_t body, const BodyMotion& motion);
+
+  /// Adds to a moving body's velocities what an impulse at a point of the world does, and wakes it. Result:
+  /// kOk; kUnknownInstance; kOutOfRange where a number is not finite.
+  Status push(std::uint32_t body, const double (&impulse)[3], const double (&at)[3]);
+
+  /// Keeps all that the next steps depend on, and goes back to it. restore() takes what save() of this world
+  /// made since its bodies were placed. Result: kOk; kKeptMismatch of another state; kOutOfMemory.
+  class State;
+  Status save(std::shared_ptr<const State>& state) const;
+  Status restore(const State& state);
+
+  /// The asset or body to blame for the last error; 0 where the status alone says what is wrong.
+  std::uint64_t where() const;
+
+ private:
+  struct Parts;
+  Status fail(Status status, std::uint64_t where = 0) const;
+  std::unique_ptr<Parts> parts_;
+};
+
+}  // namespace tandem

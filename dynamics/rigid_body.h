@@ -1,0 +1,61 @@
+#pragma once
+#include <cstdint>
+
+#include "dynamics/mass_properties.h"
+#include "tandem/kernels/scene.h"
+
+namespace tandem::dynamics {
+
+/// The properties of a body, apart from where it is.
+struct BodyProperties {
+  std::uint32_t shape = 0;                ///< by place in the list of assets
+  Motion motion = Motion::moving;         ///< never sleeping; a kinematic one keeps its velocities
+  double mass = 1;                        ///< kg; that of a fixed body is not looked at
+  double radius = 1;                      ///< of the shape, about the centre of mass
+  Vector3 centre;                         ///< of mass, in the file's coordinates
+  Matrix3 inertia = Matrix3::identity();  ///< about the centre, along the file's axes
+  Matrix3 inverse_inertia = Matrix3::identity();
+};
+
+/// The state of a body: where it is and how it moves, in the world.
+struct BodyState {
+  Vector3 position;  ///< of the centre of mass
+  Quaternion orientation;
+  Vector3 velocity, angular_velocity;
+};
+
+/// A point of the world in the body's frame about its centre of mass, and back.
+inline Vector3 into_body(const BodyState& state, const Vector3& point) {
+  return rotated(conjugated(state.orientation), point - state.position);
+}
+inline Vector3 into_world(const BodyState& state, const Vector3& point) {
+  return state.position + rotated(state.orientation, point);
+}
+
+/// Properties of a dynamic body of a mesh with this mass. radius is left as it is.
+BodyProperties body_properties(std::uint32_t shape, const MassProperties& mesh, double density);
+
+/// Returns where a question is to see the body: x_world = rotation * x_file + translation.
+Instance pose_of(const BodyProperties& body, const BodyState& state);
+
+/// The state in which pose_of() gives this pose, to rounding; at rest. Condition: the pose is rigid.
+BodyState state_of(const BodyProperties& body, const Pose& pose);
+
+/// R * inverse_inertia * R^T; zero for a body that contacts do not move.
+Matrix3 world_inverse_inertia(const BodyProperties& body, const BodyState& state);
+
+/// Moves the body by its velocities plus those of a correction, which are forgotten afterwards.
+///
+/// Rotation is by the implicit midpoint rule on the group of rotations: the angular momentum in the world
+/// stays what it is, to rounding, and the angular velocity follows from it at the end. So the kinetic energy
+/// of free rotation stays between L^2 / (2 I_max) and L^2 / (2 I_min), whatever dt: the gyroscopic term
+/// cannot blow up (Krysl and Endres 2005, LIEMID). A body that turns fast turns in parts.
+void advance(const BodyProperties& body, BodyState& state, const Vector3& correction,
+             const Vector3& angular_correction, double dt);
+
+double kinetic_energy(const BodyProperties& body, const BodyState& state);
+
+/// Returns the angular momentum about the world's origin. It is zero for a body that contacts do not move.
+Vector3 angular_momentum(const BodyProperties& body, const BodyState& state);
+
+}  // namespace tandem::dynamics

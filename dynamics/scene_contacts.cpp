@@ -1,0 +1,97 @@
+#include "dynamics/scene_contacts.h"
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <new>
+
+#include "kernels/common/stopwatch.h"
+
+namespace tandem::dynamics {
+
+void require(Status status, const Scene& scene) {
+  if (status == Status::kOutOfMemory) throw std::bad_alloc();
+  if (status != Status::kOk) throw QueryFailed{status, scene.where()};
+}
+
+void take_points(const ManifoldQuery& manifolds, std::span<const ObjectPair> pairs,
+                 std::vector<ContactPoint>& points, ContactStatistics& statistics) {
+  points.clear();
+  statistics = {manifolds.counters(), 0, 0};
+  for (const Manifold& manifold : manifolds.rows()) {
+    const ObjectPair& pair = pairs[manifold.pair];
+    const Vector3 normal = vector_of(manifold.normal);
+    statistics.area += std::fabs(dot(vector_of(manifold.area_vector), normal));
+    statistics.depth = std::max(statistics.depth, manifold.depth);
+    for (const ManifoldPoint& p : manifolds.points().subspan(manifold.first_point, manifold.point_count))
+      points.push_back({pair.a, pair.b, vector_of(p.position), normal, p.depth, p.id});
+  }
+}
+
+// Remembered pairs may keep a gap, with which their boxes no longer meet.
+std::span<const ObjectPair> ContactFinder::find_moved(Scene& scene, MovedQuery& moved,
+                                                      std::span<const ObjectPair> near,
+                                                      const Keeping& keeping) {
+  pairs_.clear(), kept_.clear();
+  std::ranges::set_union(near, keeping.remembered, std::back_inserter(pairs_));
+  require(moved.find(scene, pairs_, {.tolerance = keeping.tolerance}), scene);
+  for (std::size_t i = 0; i < pairs_.size(); ++i) {
+    if (moved.kept_rows()[i] != kNoIndex) kept_.push_back(pairs_[i]);
+  }
+  return moved.rows();
+}
+
+namespace {
+
+class SceneContacts : public ContactFinder {
+ public:
+  SceneContacts(std::span<const AssetView> assets, std::uint32_t threads, const PairFilter& filter)
+      : filter_(filter) {
+    require(scene_.set_threads(threads), scene_);
+    require(scene_.set_assets(assets), scene_);
+  }
+
+  const std::vector<ContactPoint>& find(std::span<const Instance> bodies, std::span<const std::uint8_t> idle,
+                                        const Keeping& keeping) override {
+    Stopwatch stopwatch;
+    report_ = {};
+    motion_.assign(bodies.size(), Motion::moving);
+    for (std::size_t i = 0; i < idle.size(); ++i) motion_[i] = idle[i] != 0 ? Motion::fixed : Motion::moving;
+    filter_.motion = motion_.data();
+    require(scene_.place(bodies, filter_), scene_);
+    report_.times.update = stopwatch.lap();
+    require(scene_.find_pairs(), scene_);
+    const std::span<const ObjectPair> asked = find_moved(scene_, moved_, scene_.pairs(), keeping);
+    report_.times.broad_phase = stopwatch.lap();
+    require(contacts_.find(scene_, asked, {}), scene_);
+    report_.times.traversal = stopwatch.lap();
+    // The cache remembers by itself what a point did in the step before.
+    require(manifolds_.find(scene_, contacts_, {.match_previous = false}), scene_);
+    take_points(manifolds_, contacts_.pairs(), points_, report_.contacts);
+    report_.times.generation = stopwatch.lap();
+    report_.counters = contacts_.counters();
+    report_.kept_pairs = kept_.size();
+    return points_;
+  }
+
+  std::span<const PosedBodies> posed() const override { return moved_.posed(); }
+  void resume(std::span<const PosedBodies> posed) override { require(moved_.resume(scene_, posed), scene_); }
+
+ private:
+  PairFilter filter_;
+  std::vector<Motion> motion_;
+  Scene scene_;
+  MovedQuery moved_;
+  ContactQuery contacts_;
+  ManifoldQuery manifolds_;
+  std::vector<ContactPoint> points_;
+};
+
+}  // namespace
+
+std::unique_ptr<ContactFinder> make_scene_contacts(std::span<const AssetView> assets, std::uint32_t threads,
+                                                   const PairFilter& filter) {
+  return std::make_unique<SceneContacts>(assets, threads, filter);
+}
+
+}  // namespace tandem::dynamics

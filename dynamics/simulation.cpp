@@ -1,0 +1,162 @@
+#include "dynamics/simulation.h"
+
+#include <algorithm>
+
+#include "kernels/common/stopwatch.h"
+
+namespace tandem::dynamics {
+namespace {
+
+void take(StepRecord& record, const FinderReport& report) {
+  static_cast<DetectionTimes&>(record) = report.times;
+  record.object_pairs = report.counters.object_pairs;
+  record.kept_pairs = report.kept_pairs;
+  record.block_pairs = report.counters.block_pairs;
+  record.candidates = report.counters.candidates;
+  record.triangle_pairs = report.counters.contacts;
+  record.segments = report.contacts.counters.segments;
+  record.patches = report.contacts.counters.manifolds;
+  record.open_curves = report.contacts.counters.open_curves;
+  record.contact_area = report.contacts.area;
+}
+
+}  // namespace
+
+Simulation::Simulation(std::vector<BodyProperties> bodies, std::vector<BodyState> states,
+                       SimulationParts parts, const SimulationOptions& options)
+    : bodies_(std::move(bodies)),
+      acting_(bodies_),
+      states_(std::move(states)),
+      parts_(std::move(parts)),
+      options_(options),
+      threads_(options.threads) {
+  if (parts_.solver == nullptr) parts_.solver = make_step_solver(options.solver);
+  sleep_.start(bodies_.size());
+}
+
+StepRecord Simulation::step() {
+  Stopwatch step, phase;
+  StepRecord record;
+  find_contacts(record);
+  phase.lap();
+  solve(record);
+  sleep();
+  record.solver_seconds = phase.lap();
+  record.time = static_cast<double>(++step_) * options_.dt;
+  take_measures(record);
+  record.step_seconds = step.lap();
+  return record;
+}
+
+void Simulation::find_contacts(StepRecord& record) {
+  constexpr double kFall = 2;  // times what gravity lets a body fall in a step
+  const std::vector<std::uint8_t> idle = this->idle();
+  const std::vector<ObjectPair> remembered = cache_.pairs();
+  found_ = parts_.contacts->find(poses(), idle, {remembered, options_.solver.slop});
+  take(record, parts_.contacts->report());
+  Stopwatch stopwatch;
+  const double gap = kFall * norm(options_.gravity) * options_.dt * options_.dt;
+  if (parts_.ahead)
+    parts_.ahead->add_to(found_, parts_.contacts->kept(), acting_, states_, idle, options_.dt,
+                         options_.gravity, 0.5 * options_.solver.slop);
+  cache_.update(found_, parts_.contacts->kept(), bodies_, states_, idle, gap);
+  record.generation += stopwatch.lap();
+  record.contacts = cache_.contacts().size();
+  for (const ContactPoint& contact : cache_.contacts()) {
+    const double depth = std::max(contact.depth, 0.0);
+    record.penetration_max = std::max(record.penetration_max, depth);
+    record.penetration_mean += depth / static_cast<double>(record.contacts);
+  }
+}
+
+void Simulation::solve(StepRecord& record) {
+  const std::span<const ContactPoint> contacts = cache_.contacts();
+  islands_ = find_islands(acting_, contacts);
+  std::vector<ContactImpulse> impulses(contacts.size());
+  if (options_.solver.warm_start) impulses = cache_.impulses();
+  const std::vector<BodyState> before = parts_.continuous ? states_ : std::vector<BodyState>();
+  parts_.solver->step(
+      {acting_, contacts, islands_, options_.dt, options_.gravity, step_, cache_.is_cold(), threads_},
+      states_, impulses);
+  if (parts_.continuous) parts_.continuous->limit(acting_, before, states_, options_.solver.slop);
+  cache_.remember(impulses);
+  record.residual_max = parts_.solver->statistics().residual;
+  record.residual_rms = parts_.solver->statistics().residual_rms;
+  record.islands = parts_.solver->statistics().islands;
+  record.newton_islands = parts_.solver->statistics().newton_islands;
+}
+
+void Simulation::sleep() {
+  if (!options_.sleep.enabled) return;
+  sleep_.wake_touched(acting_, cache_.contacts());
+  sleep_.fall_asleep(bodies_, states_, islands_, options_.sleep, options_.dt);
+  update_acting();
+}
+
+void Simulation::update_acting() {
+  for (std::uint32_t i = 0; i < bodies_.size(); ++i) {
+    acting_[i].motion = sleep_.sleeps(i) ? Motion::fixed : bodies_[i].motion;
+  }
+}
+
+std::vector<std::uint8_t> Simulation::idle() const {
+  std::vector<std::uint8_t> idle(acting_.size());
+  for (std::size_t i = 0; i < idle.size(); ++i) idle[i] = acting_[i].motion == Motion::fixed ? 1 : 0;
+  return idle;
+}
+
+std::vector<Instance> Simulation::poses() const {
+  std::vector<Instance> poses;
+  poses.reserve(states_.size());
+  for (std::size_t i = 0; i < states_.size(); ++i) poses.push_back(pose_of(bodies_[i], states_[i]));
+  return poses;
+}
+
+void Simulation::take_measures(StepRecord& record) const {
+  std::size_t moving = 0;
+  for (std::size_t i = 0; i < states_.size(); ++i) {
+    if (bodies_[i].motion != Motion::moving) continue;
+    const BodyState& state = states_[i];
+    const double speed = norm(state.velocity);
+    record.kinetic_energy += kinetic_energy(bodies_[i], state);
+    record.potential_energy -= bodies_[i].mass * dot(options_.gravity, state.position);
+    record.linear_momentum += bodies_[i].mass * state.velocity;
+    record.angular_momentum += angular_momentum(bodies_[i], state);
+    record.speed_max = std::max(record.speed_max, speed);
+    record.speed_mean += speed;
+    record.spin_max = std::max(record.spin_max, bodies_[i].radius * norm(state.angular_velocity));
+    ++moving;
+  }
+  if (moving > 0) record.speed_mean /= static_cast<double>(moving);
+  record.sleeping = sleep_.count();
+}
+
+void Simulation::place(std::uint32_t body, const BodyState& state) {
+  states_[body] = state;
+  sleep_.wake(body);
+  update_acting();
+}
+
+SimulationState Simulation::save() const {
+  const auto entries = cache_.entries();
+  const auto posed = parts_.contacts->posed();
+  const auto quiet = sleep_.quiet();
+  const auto groups = sleep_.groups();
+  return {step_,
+          states_,
+          {entries.begin(), entries.end()},
+          {posed.begin(), posed.end()},
+          {quiet.begin(), quiet.end()},
+          {groups.begin(), groups.end()}};
+}
+
+void Simulation::restore(SimulationState state) {
+  step_ = state.step;
+  states_ = std::move(state.states);
+  cache_.restore(std::move(state.contacts));
+  parts_.contacts->resume(state.posed);
+  sleep_.restore(std::move(state.quiet), std::move(state.groups));
+  update_acting();
+}
+
+}  // namespace tandem::dynamics

@@ -1,0 +1,117 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "dynamics/contact_cache.h"
+#include "dynamics/contacts_ahead.h"
+#include "dynamics/continuous_motion.h"
+#include "dynamics/step_solver.h"
+
+namespace tandem::dynamics {
+
+/// The record of what a step found and did. The contacts are those of the state before the step; energies,
+/// momenta and speeds are those of the state after it, over all dynamic bodies.
+struct StepRecord : DetectionTimes {  ///< generation with what the cache takes
+  double time = 0;                    ///< at the end of the step
+  double solver_seconds = 0, step_seconds = 0;
+
+  std::uint64_t object_pairs = 0, kept_pairs = 0, block_pairs = 0, candidates = 0, triangle_pairs = 0;
+  std::uint64_t segments = 0, patches = 0, open_curves = 0, contacts = 0;
+  std::uint64_t islands = 0, newton_islands = 0, sleeping = 0, reentered = 0;
+
+  double contact_ratio =
+      0;  ///< pairs of triangles that meet, by the triangles of dynamic bodies: the paper's Figure 6
+  double contact_area = 0;
+  double penetration_max = 0, penetration_mean = 0;  ///< over the contacts
+  double residual_max = 0, residual_rms = 0;         ///< SolverStatistics
+
+  double kinetic_energy = 0, potential_energy = 0;  ///< potential: 0 at the world's origin
+  Vector3 linear_momentum, angular_momentum;
+  double speed_max = 0, speed_mean = 0;  ///< of centres of mass
+  double spin_max = 0;                   ///< of the fastest point about its body's centre
+};
+
+struct SimulationOptions {
+  double dt = 1.0 / 60;
+  Vector3 gravity = {0, 0, -9.81};
+  SolverOptions solver;
+  SleepOptions sleep;
+  std::uint32_t threads = 1;
+};
+
+/// The state has all that the next steps depend on, beside bodies and options.
+struct SimulationState {
+  std::uint64_t step = 0;
+  std::vector<BodyState> states;
+  std::vector<CachedContact> contacts;
+  std::vector<PosedBodies> posed;     ///< of the contact finder
+  std::vector<double> quiet;          ///< of Sleep
+  std::vector<std::uint32_t> groups;  ///< of Sleep
+};
+
+/// What a simulation is made of, beside its bodies.
+struct SimulationParts {
+  std::unique_ptr<ContactFinder> contacts;
+  std::unique_ptr<ContactsAhead> ahead = nullptr;          ///< null: bodies are stopped when they overlap
+  std::unique_ptr<ContinuousMotion> continuous = nullptr;  ///< what keeps fast bodies from passing through
+                                                           ///< others; null: nothing does
+  std::unique_ptr<StepSolver> solver = nullptr;            ///< null: that of the options
+};
+
+/// Moves rigid bodies, step by step: contacts where the bodies stand, velocities with gravity, contacts
+/// solved for, positions by the new velocities (semi-implicit Euler). Bodies that have moved against each
+/// other by no more than the slop keep their contacts. With warm start, a step that has no impulse of the
+/// step before makes ten times the sweeps. The bytes are the same for any number of threads.
+class Simulation {
+ public:
+  /// Condition: as many states as bodies.
+  Simulation(std::vector<BodyProperties> bodies, std::vector<BodyState> states, SimulationParts parts,
+             const SimulationOptions& options);
+
+  /// Throws what the contact finder throws.
+  StepRecord step();
+
+  std::span<const BodyProperties> bodies() const { return bodies_; }
+  std::span<const BodyState> states() const { return states_; }
+  std::vector<Instance> poses() const;
+
+  /// Puts a body somewhere else, awake.
+  void place(std::uint32_t body, const BodyState& state);
+
+  /// Sets how long the next steps are, in seconds.
+  void set_step(double dt) { options_.dt = dt; }
+
+  /// The contacts of the last step, and their impulses.
+  const ContactCache& contacts() const { return cache_; }
+
+  bool sleeps(std::uint32_t body) const { return sleep_.sleeps(body); }
+
+  SimulationState save() const;
+
+  /// Goes on where save() was called. Condition: of a simulation of the same bodies and options.
+  void restore(SimulationState state);
+
+ private:
+  void find_contacts(StepRecord& record);
+  void solve(StepRecord& record);
+  void sleep();
+  void update_acting();
+  std::vector<std::uint8_t> idle() const;
+  void take_measures(StepRecord& record) const;
+
+  std::vector<BodyProperties> bodies_, acting_;  // acting_: what sleeps is fixed
+  std::vector<BodyState> states_;
+  SimulationParts parts_;
+  SimulationOptions options_;
+  Threads threads_;
+  Islands islands_;
+  std::vector<ContactPoint> found_;
+  ContactCache cache_;
+  Sleep sleep_;
+  std::uint64_t step_ = 0;
+};
+
+}  // namespace tandem::dynamics

@@ -1,0 +1,41 @@
+#pragma once
+#include <exception>
+#include <mutex>
+#include <new>
+
+#include "kernels/common/worker_threads.h"
+
+namespace tandem::dynamics {
+
+/// The threads that a step is solved on.
+class Threads {
+ public:
+  /// threads: at most, the caller's included. Throws std::bad_alloc where a thread cannot be started.
+  explicit Threads(std::uint32_t threads) : count_(threads) {
+    if (!workers_.provide(threads)) throw std::bad_alloc();
+  }
+
+  std::uint32_t count() const { return count_; }
+
+  /// Calls part(i) for each i below count, in no order, on any of the threads. Throws what a part threw.
+  template <typename Part>
+  void for_each(std::size_t count, const Part& part) {
+    std::exception_ptr thrown;
+    std::mutex mutex;
+    workers_.for_parts(count_, count, 1, [&](std::size_t begin, std::size_t end, std::uint32_t) {
+      try {
+        for (std::size_t i = begin; i < end; ++i) part(i);
+      } catch (...) {
+        const std::lock_guard lock(mutex);
+        thrown = std::current_exception();
+      }
+    });
+    if (thrown) std::rethrow_exception(thrown);
+  }
+
+ private:
+  WorkerThreads workers_;
+  std::uint32_t count_;
+};
+
+}  // namespace tandem::dynamics

@@ -1,0 +1,352 @@
+#include "tandem/dynamics/world.h"
+
+#include <algorithm>
+#include <cmath>
+#include <new>
+#include <optional>
+#include <stdexcept>
+#include <vector>
+
+#include "dynamics/scene_contacts.h"
+#include "dynamics/simulation.h"
+#include "tandem/kernels/excluded_pairs.h"
+
+namespace tandem {
+
+using namespace dynamics;
+
+class World::State {
+ public:
+  std::shared_ptr<const char> of;  // Parts::placed of the bodies whose state it is
+  double time;
+  SimulationState simulation;
+};
+
+struct World::Parts {
+  std::vector<AssetView> assets;
+  std::vector<std::uint32_t> group, mask;
+  ExcludedPairTable excluded;
+  std::unique_ptr<Simulation> simulation;
+  std::shared_ptr<const char> placed;  // of these bodies alone; null where there are none
+  std::vector<BodyMotion> bodies;
+  std::vector<WorldContact> contacts;
+  double time = 0;
+  std::uint64_t where = 0;
+
+  void clear() {
+    simulation.reset(), placed.reset();
+    bodies.clear(), contacts.clear();
+    time = 0, where = 0;
+  }
+  void read();
+  void read_contacts();
+};
+
+namespace {
+
+// Bodies that rest in a heap creep more slowly than this, in m/s.
+constexpr double kSleepSpeed = 0.03;
+
+void write(const Vector3& x, double (&out)[3]) {
+  out[0] = x.x, out[1] = x.y, out[2] = x.z;
+}
+
+// Of NaN too it is false.
+bool is_option(double x, double least, double most) {
+  return x >= least && x <= most;
+}
+
+Status check(const WorldOptions& options) {
+  constexpr double kMost = 1e6;
+  bool good = is_option(options.friction, 0, kMost) && is_option(options.restitution, 0, 1) &&
+              options.slop <= kMost && options.rolling_resistance <= kMost &&
+              is_option(options.substeps, 1, 10'000) && is_option(options.threads, 1, kMostSceneThreads);
+  for (const double g : options.gravity) good = good && is_option(g, -kMost, kMost);
+  return good ? Status::kOk : Status::kBadOption;
+}
+
+// Returns whether a step can start from a state.
+bool is_usable(const BodyState& state) {
+  const Vector3& x = state.position;
+  const double most = std::max({std::fabs(x.x), std::fabs(x.y), std::fabs(x.z)});
+  return is_finite(x) && most <= kLargestWorldCoordinate && std::isfinite(state.orientation.w) &&
+         is_finite(state.velocity) && is_finite(state.angular_velocity);
+}
+
+// Masses of assets, found once.
+class Masses {
+ public:
+  explicit Masses(std::span<const AssetView> assets) : assets_(assets), of_(assets.size()) {}
+
+  Status find(const BodyDescription& from, BodyProperties& body) {
+    body.shape = from.asset;
+    body.motion = from.filter.motion == Motion::sleeping ? Motion::moving : from.filter.motion;
+    const AssetView& asset = assets_[from.asset];
+    if (body.motion == Motion::fixed) {
+      body.radius = radius_about({}, asset);
+      return Status::kOk;
+    }
+    if (!(from.density > 0 && std::isfinite(from.density))) return Status::kNoMass;
+    if (asset.level().topology == nullptr) return Status::kNoTopology;
+    if (!of_[from.asset]) {
+      try {
+        of_[from.asset] = body_properties(from.asset, mass_properties(asset).properties, 1);
+      } catch (const std::runtime_error&) {
+        return Status::kNoMass;
+      }
+      of_[from.asset]->radius = radius_about(of_[from.asset]->centre, asset);
+    }
+    const Motion motion = body.motion;
+    body = *of_[from.asset];
+    body.motion = motion;
+    body.mass *= from.density;
+    body.inertia = from.density * body.inertia;
+    body.inverse_inertia = (1 / from.density) * body.inverse_inertia;
+    return Status::kOk;
+  }
+
+ private:
+  std::span<const AssetView> assets_;
+  std::vector<std::optional<BodyProperties>> of_;
+};
+
+double default_slop(std::span<const AssetView> assets, std::span<const BodyProperties> bodies) {
+  constexpr double kOfDiagonal = 1.0 / 4000;
+  double least = INFINITY;
+  for (const BodyProperties& body : bodies) {
+    const FileHeader& header = *assets[body.shape].header;
+    if (body.motion == Motion::moving)
+      least = std::min(least, norm(vector_of(header.upper) - vector_of(header.lower)));
+  }
+  return std::isfinite(least) ? kOfDiagonal * least : 5e-4;
+}
+
+}  // namespace
+
+World::World() : parts_(new (std::nothrow) Parts) {}
+World::World(World&&) noexcept = default;
+World& World::operator=(World&&) noexcept = default;
+World::~World() = default;
+
+Status World::fail(Status status, std::uint64_t where) const {
+  if (parts_ != nullptr) parts_->where = where;
+  return status;
+}
+
+Status World::set_assets(std::span<const AssetView> assets) {
+  if (parts_ == nullptr) return Status::kOutOfMemory;
+  parts_->clear();
+  parts_->assets.clear();
+  Scene scene;
+  const Status status = scene.set_assets(assets);
+  if (status != Status::kOk) return fail(status, scene.where());
+  try {
+    parts_->assets.assign(assets.begin(), assets.end());
+  } catch (const std::bad_alloc&) {
+    return fail(Status::kOutOfMemory);
+  }
+  return Status::kOk;
+}
+
+Status World::set_bodies(std::span<const BodyDescription> bodies, const WorldOptions& options,
+                         std::span<const ObjectPair> excluded) {
+  if (parts_ == nullptr) return Status::kOutOfMemory;
+  Parts& parts = *parts_;
+  parts.clear();
+  if (check(options) != Status::kOk) return fail(Status::kBadOption);
+  try {
+    Masses masses(parts.assets);
+    std::vector<BodyProperties> all(bodies.size());
+    std::vector<BodyState> states(bodies.size());
+    parts.group.clear(), parts.mask.clear();
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+      const BodyDescription& from = bodies[i];
+      if (from.asset >= parts.assets.size()) return fail(Status::kUnknownAsset, i);
+      if (!is_rigid(from.pose)) return fail(Status::kPoseNotRigid, i);
+      const Status status = masses.find(from, all[i]);
+      if (status != Status::kOk) return fail(status, i);
+      states[i] = state_of(all[i], from.pose);
+      if (all[i].motion != Motion::fixed) {
+        states[i].velocity = vector_of(from.velocity);
+        states[i].angular_velocity = vector_of(from.angular_velocity);
+      }
+      if (!is_usable(states[i])) return fail(Status::kOutOfRange, i);
+      parts.group.push_back(from.filter.group), parts.mask.push_back(from.filter.mask);
+    }
+    const Status excludes = parts.excluded.set(excluded);
+    if (excludes != Status::kOk) return fail(excludes);
+    const PairFilter filter = {nullptr, parts.group.data(), parts.mask.data(), parts.excluded.view()};
+    SimulationOptions to;
+    to.gravity = vector_of(options.gravity);
+    to.solver.friction = options.friction, to.solver.restitution = options.restitution;
+    to.solver.slop = options.slop >= 0 ? options.slop : default_slop(parts.assets, all);
+    to.solver.rolling_resistance =
+        options.rolling_resistance >= 0 ? options.rolling_resistance : 16 * to.solver.slop;
+    to.solver.substeps = options.substeps;
+    to.sleep.enabled = options.sleeping;
+    to.sleep.speed = kSleepSpeed;
+    to.threads = options.threads;
+    SimulationParts of;
+    of.contacts = make_scene_contacts(parts.assets, options.threads, filter);
+    of.ahead = std::make_unique<ContactsAhead>(parts.assets, options.threads, filter);
+    if (options.continuous)
+      of.continuous = std::make_unique<ContinuousMotion>(parts.assets, options.threads, filter);
+    parts.simulation = std::make_unique<Simulation>(std::move(all), std::move(states), std::move(of), to);
+    parts.placed = std::make_shared<char>();
+    parts.read();
+  } catch (const std::bad_alloc&) {
+    parts.clear();
+    return fail(Status::kOutOfMemory);
+  } catch (const QueryFailed& failed) {
+    parts.clear();
+    return fail(failed.status, failed.where);
+  }
+  return Status::kOk;
+}
+
+void World::Parts::read() {
+  const auto properties = simulation->bodies();
+  const auto states = simulation->states();
+  bodies.resize(states.size());
+  for (std::uint32_t i = 0; i < states.size(); ++i) {
+    bodies[i].pose = pose_of(properties[i], states[i]).pose;
+    write(states[i].position, bodies[i].centre);
+    write(states[i].velocity, bodies[i].velocity);
+    write(states[i].angular_velocity, bodies[i].angular_velocity);
+    bodies[i].sleeps = simulation->sleeps(i);
+  }
+}
+
+void World::Parts::read_contacts() {
+  const std::vector<ContactImpulse> impulses = simulation->contacts().impulses();
+  contacts.clear();
+  for (const ContactPoint& point : simulation->contacts().contacts()) {
+    const ContactImpulse& impulse = impulses[contacts.size()];
+    WorldContact& contact = contacts.emplace_back();
+    contact.a = point.body_a, contact.b = point.body_b;
+    contact.depth = point.depth;
+    write(point.position, contact.position);
+    write(point.normal, contact.normal);
+    write(impulse.normal * point.normal + impulse.tangential, contact.impulse);
+  }
+}
+
+Status World::step(double dt, std::uint32_t steps) {
+  if (parts_ == nullptr) return Status::kOutOfMemory;
+  if (!(dt > 0 && dt <= 1000)) return fail(Status::kBadDuration);
+  if (parts_->simulation == nullptr) return fail(Status::kOk);
+  Parts& parts = *parts_;
+  Simulation& simulation = *parts.simulation;
+  Status status = Status::kOk;
+  std::uint64_t blamed = 0;
+  try {
+    simulation.set_step(dt);
+    for (std::uint32_t i = 0; i < steps && status == Status::kOk; ++i) {
+      SimulationState before = simulation.save();
+      try {
+        simulation.step();
+      } catch (const QueryFailed& failed) {
+        status = failed.status, blamed = failed.where;
+      } catch (const std::bad_alloc&) {
+        status = Status::kOutOfMemory;
+      }
+      const auto states = simulation.states();
+      const auto lost = std::ranges::find_if_not(states, is_usable);
+      if (status == Status::kOk && lost != states.end())
+        status = Status::kOutOfRange, blamed = static_cast<std::uint64_t>(lost - states.begin());
+      if (status != Status::kOk)
+        simulation.restore(std::move(before));
+      else
+        parts.time += dt;
+    }
+    parts.read();
+    parts.read_contacts();
+  } catch (const std::bad_alloc&) {
+    return fail(Status::kOutOfMemory);
+  } catch (const QueryFailed& failed) {
+    return fail(failed.status, failed.where);
+  }
+  return fail(status, blamed);
+}
+
+std::span<const BodyMotion> World::bodies() const {
+  return parts_ != nullptr ? std::span<const BodyMotion>(parts_->bodies) : std::span<const BodyMotion>();
+}
+
+std::span<const WorldContact> World::contacts() const {
+  return parts_ != nullptr ? std::span<const WorldContact>(parts_->contacts)
+                           : std::span<const WorldContact>();
+}
+
+double World::time() const {
+  return parts_ != nullptr ? parts_->time : 0;
+}
+
+double World::mass_of(std::uint32_t body) const {
+  if (body >= bodies().size()) return 0;
+  const BodyProperties& of = parts_->simulation->bodies()[body];
+  return of.motion == Motion::moving ? of.mass : 0;
+}
+
+Status World::set(std::uint32_t body, const BodyMotion& motion) {
+  if (body >= bodies().size()) return fail(Status::kUnknownInstance, body);
+  if (!is_rigid(motion.pose)) return fail(Status::kPoseNotRigid, body);
+  BodyState state = state_of(parts_->simulation->bodies()[body], motion.pose);
+  state.velocity = vector_of(motion.velocity);
+  state.angular_velocity = vector_of(motion.angular_velocity);
+  if (!is_usable(state)) return fail(Status::kOutOfRange, body);
+  parts_->simulation->place(body, state);
+  parts_->read();
+  return fail(Status::kOk);
+}
+
+Status World::push(std::uint32_t body, const double (&impulse)[3], const double (&at)[3]) {
+  if (body >= bodies().size()) return fail(Status::kUnknownInstance, body);
+  const BodyProperties& of = parts_->simulation->bodies()[body];
+  if (of.motion != Motion::moving) return fail(Status::kOk);
+  BodyState state = parts_->simulation->states()[body];
+  const Vector3 by = vector_of(impulse), arm = vector_of(at) - state.position;
+  state.velocity += by / of.mass;
+  state.angular_velocity += world_inverse_inertia(of, state) * cross(arm, by);
+  if (!is_usable(state)) return fail(Status::kOutOfRange, body);
+  parts_->simulation->place(body, state);
+  parts_->read();
+  return fail(Status::kOk);
+}
+
+Status World::save(std::shared_ptr<const State>& state) const {
+  if (parts_ == nullptr) return Status::kOutOfMemory;
+  try {
+    auto kept = std::make_shared<State>();
+    kept->of = parts_->placed;
+    kept->time = parts_->time;
+    if (parts_->simulation != nullptr) kept->simulation = parts_->simulation->save();
+    state = std::move(kept);
+  } catch (const std::bad_alloc&) {
+    return fail(Status::kOutOfMemory);
+  }
+  return fail(Status::kOk);
+}
+
+Status World::restore(const State& state) {
+  if (parts_ == nullptr) return Status::kOutOfMemory;
+  if (state.of != parts_->placed) return fail(Status::kKeptMismatch);
+  if (state.of == nullptr) return fail(Status::kOk);
+  try {
+    parts_->simulation->restore(state.simulation);
+    parts_->time = state.time;
+    parts_->contacts.clear();
+    parts_->read();
+  } catch (const std::bad_alloc&) {
+    return fail(Status::kOutOfMemory);
+  } catch (const QueryFailed& failed) {
+    return fail(failed.status, failed.where);
+  }
+  return fail(Status::kOk);
+}
+
+std::uint64_t World::where() const {
+  return parts_ != nullptr ? parts_->where : 0;
+}
+
+}  // namespace tandem

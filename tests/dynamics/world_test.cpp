@@ -1,0 +1,242 @@
+#include "tandem/dynamics/world.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "kernels/manifold/manifold_scene.h"
+
+/// Bodies that move, beside closed forms.
+namespace tandem::test {
+namespace {
+
+constexpr double kStep = 1.0 / 60, kGravity = 9.81;
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+
+double mean(const double (&x)[3]) {
+  return (x[0] + x[1] + x[2]) / 3;
+}
+
+// A ground whose upper side is z = 0, and bodies above it.
+class WorldOnGround {
+ public:
+  explicit WorldOnGround(const Mesh& mesh) {
+    assets_.add(box(40, 40, 2));
+    assets_.add(mesh);
+    add(shift(0, 0, -1)).filter.motion = Motion::fixed;
+    bodies.back().asset = 0;
+  }
+  BodyDescription& add(const Pose& pose) {
+    BodyDescription& body = bodies.emplace_back();
+    body.asset = 1, body.pose = pose;
+    return body;
+  }
+  World& begin(const WorldOptions& options = {}) {
+    EXPECT_EQ(world.set_assets(assets_.views()), Status::kOk);
+    EXPECT_EQ(world.set_bodies(bodies, options), Status::kOk);
+    return world;
+  }
+  double fastest() const {
+    double most = 0;
+    for (const BodyMotion& body : world.bodies()) most = std::max(most, norm(vector_of(body.velocity)));
+    return most;
+  }
+  double kinetic_energy() const {
+    double sum = 0;
+    for (std::uint32_t i = 0; i < world.bodies().size(); ++i) {
+      const Vector3 v = vector_of(world.bodies()[i].velocity);
+      sum += 0.5 * world.mass_of(i) * dot(v, v);
+    }
+    return sum;
+  }
+
+  std::vector<BodyDescription> bodies;
+  World world;
+
+ private:
+  SampleAssets assets_;
+};
+
+TEST(World, ABodyFallsAsGalileiSays) {
+  WorldOnGround scene(box(1, 1, 1));
+  scene.add(shift(0, 0, 100)).velocity[0] = 3;
+  World& world = scene.begin();
+  ASSERT_EQ(world.step(kStep, 120), Status::kOk);
+  EXPECT_NEAR(world.time(), 2, 1e-12);
+  EXPECT_NEAR(world.bodies()[1].centre[2], 100 - 0.5 * kGravity * 4, 1e-10);
+  EXPECT_NEAR(world.bodies()[1].centre[0], 6, 1e-10);
+  EXPECT_NEAR(world.mass_of(1), 1000, 1e-9);
+  EXPECT_EQ(world.mass_of(0), 0);
+}
+
+TEST(World, ATowerWithGapsComesToRestAsItStands) {
+  WorldOnGround scene(box(1, 1, 1));
+  for (int i = 0; i < 30; ++i) scene.add(shift(0, 0, 0.5 + 1.00001 * i + 1e-5));
+  World& world = scene.begin({.sleeping = false});
+  double deepest = 0;
+  for (int i = 0; i < 300; ++i) {
+    ASSERT_EQ(world.step(kStep), Status::kOk);
+    for (const WorldContact& contact : world.contacts()) deepest = std::max(deepest, contact.depth);
+  }
+  EXPECT_LT(deepest, 1e-4);
+  EXPECT_LT(scene.fastest(), 1e-6);
+  for (int i = 1; i <= 30; ++i) EXPECT_NEAR(world.bodies()[i].centre[2], i - 0.5, 1e-3);
+}
+
+TEST(World, ContactsCarryTheWeight) {
+  WorldOnGround scene(box(1, 1, 1));
+  scene.add(shift(0, 0, 0.5));
+  scene.add(shift(0.2, 0.1, 1.5));
+  World& world = scene.begin({.sleeping = false});
+  ASSERT_EQ(world.step(kStep, 120), Status::kOk);
+  double on_ground = 0, between = 0;
+  for (const WorldContact& contact : world.contacts())
+    (contact.a == 0 ? on_ground : between) += contact.impulse[2] / kStep;
+  EXPECT_NEAR(on_ground, 2000 * kGravity, 0.01 * on_ground);
+  EXPECT_NEAR(between, 1000 * kGravity, 0.01 * on_ground);
+}
+
+TEST(World, ABounceIsAsHighAsRestitutionSays) {
+  for (const double restitution : {1.0, 0.8, 0.5}) {
+    for (double drop = 0.5; drop < 2; drop += 0.17) {
+      WorldOnGround scene(sphere(0.5, 3));
+      scene.add(shift(0.3, 0.2, 0.5 + drop));
+      World& world = scene.begin({.restitution = restitution});
+      double highest = 0;
+      for (bool rises = false; world.time() < 2;) {
+        ASSERT_EQ(world.step(kStep), Status::kOk);
+        const BodyMotion& ball = world.bodies()[1];
+        if (rises && ball.velocity[2] < 0) break;
+        rises = ball.velocity[2] > 0;
+        if (rises) highest = std::max(highest, ball.centre[2] - 0.5);
+      }
+      EXPECT_NEAR(highest / (restitution * restitution * drop), 1, 0.02) << drop;
+    }
+  }
+}
+
+TEST(World, ABallRollsOn) {
+  WorldOnGround scene(sphere(0.5, 6));
+  BodyDescription& ball = scene.add(shift(-15, 0, 0.5));
+  ball.velocity[0] = 2, ball.angular_velocity[1] = 4;
+  World& world = scene.begin({.rolling_resistance = 0});
+  ASSERT_EQ(world.step(kStep, 300), Status::kOk);
+  EXPECT_NEAR(world.bodies()[1].centre[0], -5, 0.25);  // 10 m; until contacts were let roll, 6
+}
+
+TEST(World, ARodThatSpinsFastKeepsItsEnergy) {
+  WorldOnGround scene(box(1, 0.04f, 0.04f));
+  BodyDescription& rod = scene.add(shift(0, 0, 5));
+  rod.angular_velocity[0] = 3, rod.angular_velocity[2] = 60;
+  World& world = scene.begin({.gravity = {0, 0, 0}});
+  const double spin = norm(vector_of(world.bodies()[1].angular_velocity));
+  for (int i = 0; i < 300; ++i) {
+    ASSERT_EQ(world.step(kStep), Status::kOk);
+    ASSERT_NEAR(norm(vector_of(world.bodies()[1].angular_velocity)) / spin, 1, 0.01) << i;
+  }
+}
+
+TEST(World, AHeapComesToRestAndSleeps) {
+  WorldOnGround scene(box(1, 0.4f, 0.25f));
+  RandomPoses random(1);
+  for (int i = 0; i < 40; ++i) {
+    const Pose turned = any_motion(random, 0);
+    scene.add(after(shift(0.4 * (i % 3) - 0.4, 0.4 * (i / 3 % 3) - 0.4, 1 + 0.5 * i / 9), turned));
+  }
+  World& world = scene.begin();
+  ASSERT_EQ(world.step(kStep, 900), Status::kOk);
+  EXPECT_EQ(scene.fastest(), 0);
+  EXPECT_TRUE(std::all_of(world.bodies().begin() + 1, world.bodies().end(),
+                          [](const BodyMotion& body) { return body.sleeps && body.centre[2] > 0.12; }));
+  const double up[3] = {0, 0, 5};
+  ASSERT_EQ(world.push(7, up, world.bodies()[7].centre), Status::kOk);
+  EXPECT_FALSE(world.bodies()[7].sleeps);
+  EXPECT_NEAR(world.bodies()[7].velocity[2], 5 / world.mass_of(7), 1e-12);
+}
+
+TEST(World, ContinuousMotionBringsNoEnergy) {
+  RandomPoses random(2);
+  for (int heap = 0; heap < trials(4, 10); ++heap) {
+    WorldOnGround scene(heap % 2 == 0 ? box(1, 0.04f, 0.04f) : box(0.5f, 0.5f, 0.02f));
+    for (int i = 0; i < 20; ++i)
+      scene.add(after(shift(0.5 * (i % 3), 0.5 * (i / 3 % 3), 0.8 + 0.3 * i), any_motion(random, 0)));
+    World& world = scene.begin({.continuous = true});
+    const auto energy = [&] {
+      double sum = scene.kinetic_energy();
+      for (std::uint32_t i = 1; i < scene.bodies.size(); ++i)
+        sum += world.mass_of(i) * kGravity * world.bodies()[i].centre[2];
+      return sum;
+    };
+    const double start = energy();
+    for (int i = 0; i < 180; ++i) {
+      ASSERT_EQ(world.step(kStep), Status::kOk);
+      ASSERT_LT(energy(), 1.01 * start) << i;
+    }
+  }
+}
+
+TEST(World, GoesBackToWhatWasSavedAndDoesNotDependOnThreads) {
+  std::vector<BodyMotion> ends[3];
+  for (int run = 0; run < 2; ++run) {
+    WorldOnGround scene(tetrahedron());
+    RandomPoses random(3);
+    for (int i = 0; i < 30; ++i)
+      scene.add(after(shift(0.7 * (i % 3), 0.7 * (i / 3 % 3), 1 + 0.3 * i), any_motion(random, 0)));
+    World& world = scene.begin({.threads = run == 0 ? 1u : 3u});
+    ASSERT_EQ(world.step(kStep, 60), Status::kOk);
+    std::shared_ptr<const World::State> state;
+    ASSERT_EQ(world.save(state), Status::kOk);
+    for (const int end : {run, 2}) {
+      ASSERT_EQ(world.restore(*state), Status::kOk);
+      ASSERT_EQ(world.step(kStep, 60), Status::kOk);
+      ends[end].assign(world.bodies().begin(), world.bodies().end());
+      EXPECT_NEAR(world.time(), 2, 1e-12);
+    }
+    for (std::size_t i = 0; i < ends[2].size(); ++i) {
+      EXPECT_EQ(mean(ends[run][i].centre), mean(ends[2][i].centre));
+      EXPECT_EQ(mean(ends[0][i].centre), mean(ends[run][i].centre));
+    }
+    ASSERT_EQ(world.set_bodies(scene.bodies), Status::kOk);
+    EXPECT_EQ(world.restore(*state), Status::kKeptMismatch);
+  }
+}
+
+TEST(World, RefusesWhatItCannotMove) {
+  WorldOnGround scene(box(1, 1, 1));
+  scene.add(shift(0, 0, 5));
+  World& world = scene.begin();
+  const auto refused = [&](const auto& change, Status expected) {
+    std::vector<BodyDescription> bodies = scene.bodies;
+    change(bodies[1]);
+    EXPECT_EQ(world.set_bodies(bodies), expected);
+    EXPECT_EQ(world.where(), 1u);
+    EXPECT_TRUE(world.bodies().empty());
+  };
+  refused([](BodyDescription& body) { body.asset = 2; }, Status::kUnknownAsset);
+  refused([](BodyDescription& body) { body.pose.rotation[0][0] = 2; }, Status::kPoseNotRigid);
+  refused([](BodyDescription& body) { body.density = 0; }, Status::kNoMass);
+  refused([](BodyDescription& body) { body.density = kNan; }, Status::kNoMass);
+  refused([](BodyDescription& body) { body.velocity[1] = kNan; }, Status::kOutOfRange);
+  for (const WorldOptions& options :
+       {WorldOptions{.friction = -1}, WorldOptions{.restitution = 1.1}, WorldOptions{.slop = kNan},
+        WorldOptions{.substeps = 0}, WorldOptions{.threads = 0}, WorldOptions{.gravity = {0, kNan, 0}}})
+    EXPECT_EQ(world.set_bodies(scene.bodies, options), Status::kBadOption);
+  ASSERT_EQ(world.set_bodies(scene.bodies), Status::kOk);
+  for (const double dt : {0.0, -1.0, kNan, 1001.0}) EXPECT_EQ(world.step(dt), Status::kBadDuration);
+  EXPECT_EQ(world.set(2, world.bodies()[1]), Status::kUnknownInstance);
+  EXPECT_EQ(world.push(9, {1, 0, 0}, {0, 0, 0}), Status::kUnknownInstance);
+  EXPECT_EQ(world.push(1, {kNan, 0, 0}, {0, 0, 0}), Status::kOutOfRange);
+  EXPECT_EQ(world.step(kStep), Status::kOk);
+}
+
+TEST(World, WhatLeavesTheRangeOfNumbersIsToldAndTheRestStaysAsItWas) {
+  WorldOnGround scene(box(1, 1, 1));
+  scene.add(shift(0, 0, 5)).velocity[2] = 1e300;
+  World& world = scene.begin({.sleeping = false});
+  EXPECT_EQ(world.step(1000, 100), Status::kOutOfRange);
+  EXPECT_EQ(world.where(), 1u);
+  EXPECT_TRUE(std::isfinite(world.bodies()[1].centre[2]));
+}
+
+}  // namespace
+}  // namespace tandem::test

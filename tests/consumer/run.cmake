@@ -31,6 +31,8 @@ require_shown(docs/impact.md cpp "${program}")
 
 file(READ ${SOURCE}/tests/consumer/contacts.c program)
 require_shown(docs/c.md c "${program}")
+file(READ ${SOURCE}/tests/consumer/falling.c program)
+require_shown(docs/c.md c "${program}")
 
 file(REMOVE_RECURSE ${FOLDER})
 run(${CMAKE_COMMAND} --install ${BUILD} --prefix ${FOLDER}/prefix)
@@ -69,6 +71,8 @@ endif()
 run(${FOLDER}/consumer/contacts_in_c ${FOLDER}/box.bvh)
 require_shown(docs/c.md "" "${output}")
 set(told_in_c "${output}")
+run(${FOLDER}/consumer/falling ${FOLDER}/box.bvh)
+require_shown(docs/c.md "" "${output}")
 # Half a length apart these do not meet.
 file(WRITE ${FOLDER}/flat.obj "v 0 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\n")
 run(${BVHBUILD} ${FOLDER}/flat.obj -o ${FOLDER}/flat.bvh --quiet)

@@ -113,7 +113,7 @@ set(TANDEM_TESTS OFF)
 set(TANDEM_CUDA OFF)
 set(TANDEM_PYTHON OFF)
 add_subdirectory("{SOURCE}" tandem)
-foreach(target build c formats kernels runtime)
+foreach(target build c dynamics formats kernels runtime)
   if(NOT TARGET tandem::${{target}})
     message(FATAL_ERROR "no ${{target}}")
   endif()
@@ -175,7 +175,7 @@ class WheelTest(unittest.TestCase):
         with tarfile.open(self.sdist) as archive:
             names = [member.name.partition("/")[2] for member in archive]
         self.assertEqual({name.partition("/")[0] for name in names},
-                         {"CHANGELOG.md", "CMakeLists.txt", "LICENSE", "PKG-INFO", "README.md", "bindings", "cmake", "formats", "kernels", "pyproject.toml", "runtime", "tools"})
+                         {"CHANGELOG.md", "CMakeLists.txt", "LICENSE", "PKG-INFO", "README.md", "bindings", "cmake", "dynamics", "formats", "kernels", "pyproject.toml", "runtime", "tools"})
         self.assertLess(self.sdist.stat().st_size, 2e6)
 
     def test_the_wheel_is_for_manylinux(self):

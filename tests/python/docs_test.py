@@ -35,7 +35,7 @@ def test_pages_show_what_happens(page, tmp_path, monkeypatch):
 
 def modules():
     """All that are imported with the package alone."""
-    names = [name for _, name, _ in pkgutil.iter_modules(tandem.__path__) if name in ("_arrays", "_asset", "_build", "_errors", "_rows", "_scene")]
+    names = [name for _, name, _ in pkgutil.iter_modules(tandem.__path__) if name in ("_arrays", "_asset", "_build", "_errors", "_rows", "_scene", "_world")]
     return [tandem] + [importlib.import_module(f"tandem.{name}") for name in names]
 
 

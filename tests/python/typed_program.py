@@ -79,9 +79,29 @@ def ask(scene: tandem.Scene) -> None:
         print(status, error.name, where, subject)
 
 
+def simulate(assets: list[tandem.Asset]) -> None:
+    filter = tandem.Filter(motion=[tandem.FIXED, tandem.MOVING])
+    world = tandem.World(assets, asset=[0, 1], rotation=Turn(), translation=[[0.0, 0.0, 0.0], [0.0, 0.0, 2.0]], filter=filter, density=500, velocity=np.zeros(3),
+                         angular_velocity=[0, 0, 1], gravity=(0, 0, -1), friction=0.1, restitution=0.5, slop=None, rolling_resistance=0.0, substeps=4,
+                         sleeping=True, continuous=True, threads=2)
+    state: tandem.WorldState = world.save()
+    world.step(1 / 60, steps=10)
+    world.push(1, [0, 0, 1], at=np.zeros(3))
+    world.move(1, translation=[0, 0, 3], velocity=[0, 0, 0], angular_velocity=[0, 0, 0])
+    world.restore(state)
+    rotation: npt.NDArray[np.float64] = world.rotation
+    sleeping: npt.NDArray[np.bool_] = world.sleeping
+    bodies: npt.NDArray[np.void] = world.bodies
+    time: float = world.time
+    print(rotation.shape, sleeping.any(), bodies["centre"], time, world.translation, world.velocity, world.angular_velocity, world.mass, len(world.contacts))
+    print(world.place(world.instances, filter=filter, density=[1, 2]).time, tandem.BODY_MOTION, tandem.WORLD_CONTACT)
+
+
 def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
-        ask(tandem.Scene(assets(Path(folder)), threads=1))
+        made = assets(Path(folder))
+        ask(tandem.Scene(made, threads=1))
+        simulate(made)
     try:
         mesh: tandem.Mesh = tandem.read_mesh("nowhere.obj")
         print(mesh.vertices.shape, mesh.triangles.shape, mesh.face_ids.shape, mesh.parts, mesh.remarks)

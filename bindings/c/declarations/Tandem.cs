@@ -433,6 +433,55 @@ public unsafe struct tandem_counters {
   public tandem_moved_counters moved;
 }
 
+[StructLayout(LayoutKind.Sequential)]
+public unsafe struct tandem_world_options {
+  public uint struct_size;
+  public uint no_gravity;
+  public uint no_friction;
+  public uint no_slop;
+  public uint no_rolling_resistance;
+  public uint no_sleeping;
+  public uint continuous;
+  public uint substeps;
+  public uint threads;
+  public uint reserved;
+  public fixed double gravity[3];
+  public double friction;
+  public double restitution;
+  public double slop;
+  public double rolling_resistance;
+}
+
+[StructLayout(LayoutKind.Sequential)]
+public unsafe struct tandem_body_start {
+  public uint struct_size;
+  public uint reserved;
+  public UIntPtr count;
+  public double* density;
+  public double* velocity;
+  public double* angular_velocity;
+}
+
+[StructLayout(LayoutKind.Sequential)]
+public unsafe struct tandem_body_motion {
+  public tandem_pose pose;
+  public fixed double centre[3];
+  public fixed double velocity[3];
+  public fixed double angular_velocity[3];
+  public byte sleeps;
+  public fixed byte reserved[7];
+}
+
+[StructLayout(LayoutKind.Sequential)]
+public unsafe struct tandem_world_contact {
+  public uint a;
+  public uint b;
+  public fixed double position[3];
+  public fixed double normal[3];
+  public double depth;
+  public fixed double impulse[3];
+}
+
 public static unsafe class Native {
   public const uint TANDEM_OK = 0;
   public const uint TANDEM_NULL_ARGUMENT = 1;
@@ -520,6 +569,7 @@ public static unsafe class Native {
   public const uint TANDEM_BAD_REACH = 213;
   public const uint TANDEM_BAD_TOLERANCE = 214;
   public const uint TANDEM_BAD_DURATION = 215;
+  public const uint TANDEM_NO_MASS = 216;
   public const uint TANDEM_NO_GPU = 300;
   public const uint TANDEM_DRIVER_TOO_OLD = 301;
   public const uint TANDEM_GPU_NOT_SUPPORTED = 302;
@@ -614,5 +664,20 @@ public static unsafe class Native {
   [DllImport("tandem")] public static extern tandem_body_at* tandem_scene_bodies_at(IntPtr scene, UIntPtr* count);
   [DllImport("tandem")] public static extern uint tandem_scene_find(IntPtr scene, tandem_questions* questions);
   [DllImport("tandem")] public static extern uint tandem_scene_get_counters(IntPtr scene, tandem_counters* counters);
+  [DllImport("tandem")] public static extern uint tandem_world_create(tandem_world_options* options, tandem_allocator* allocator, IntPtr* world);
+  [DllImport("tandem")] public static extern void tandem_world_destroy(IntPtr world);
+  [DllImport("tandem")] public static extern uint tandem_world_set_assets(IntPtr world, IntPtr* assets, UIntPtr count);
+  [DllImport("tandem")] public static extern uint tandem_world_set_bodies(IntPtr world, tandem_instance* instances, UIntPtr count, tandem_pair_filter* filter, tandem_body_start* start);
+  [DllImport("tandem")] public static extern uint tandem_world_step(IntPtr world, double dt, uint steps);
+  [DllImport("tandem")] public static extern tandem_body_motion* tandem_world_bodies(IntPtr world, UIntPtr* count);
+  [DllImport("tandem")] public static extern tandem_world_contact* tandem_world_contacts(IntPtr world, UIntPtr* count);
+  [DllImport("tandem")] public static extern double tandem_world_time(IntPtr world);
+  [DllImport("tandem")] public static extern double tandem_world_mass(IntPtr world, uint body);
+  [DllImport("tandem")] public static extern uint tandem_world_set_body(IntPtr world, uint body, tandem_body_motion* motion);
+  [DllImport("tandem")] public static extern uint tandem_world_push(IntPtr world, uint body, double* impulse, double* at);
+  [DllImport("tandem")] public static extern uint tandem_world_save(IntPtr world, IntPtr* state);
+  [DllImport("tandem")] public static extern uint tandem_world_restore(IntPtr world, IntPtr state);
+  [DllImport("tandem")] public static extern void tandem_world_state_destroy(IntPtr state);
+  [DllImport("tandem")] public static extern ulong tandem_world_where(IntPtr world);
 }
 }

@@ -89,6 +89,7 @@ pub const TANDEM_NO_FINEST_LEVEL: u32 = 212;
 pub const TANDEM_BAD_REACH: u32 = 213;
 pub const TANDEM_BAD_TOLERANCE: u32 = 214;
 pub const TANDEM_BAD_DURATION: u32 = 215;
+pub const TANDEM_NO_MASS: u32 = 216;
 pub const TANDEM_NO_GPU: u32 = 300;
 pub const TANDEM_DRIVER_TOO_OLD: u32 = 301;
 pub const TANDEM_GPU_NOT_SUPPORTED: u32 = 302;
@@ -148,6 +149,16 @@ pub struct tandem_scene {
 
 #[repr(C)]
 pub struct tandem_device {
+    _private: [u8; 0],
+}
+
+#[repr(C)]
+pub struct tandem_world {
+    _private: [u8; 0],
+}
+
+#[repr(C)]
+pub struct tandem_world_state {
     _private: [u8; 0],
 }
 
@@ -622,6 +633,59 @@ pub struct tandem_counters {
     pub moved: tandem_moved_counters,
 }
 
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct tandem_world_options {
+    pub struct_size: u32,
+    pub no_gravity: u32,
+    pub no_friction: u32,
+    pub no_slop: u32,
+    pub no_rolling_resistance: u32,
+    pub no_sleeping: u32,
+    pub continuous: u32,
+    pub substeps: u32,
+    pub threads: u32,
+    pub reserved: u32,
+    pub gravity: [f64; 3],
+    pub friction: f64,
+    pub restitution: f64,
+    pub slop: f64,
+    pub rolling_resistance: f64,
+}
+
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct tandem_body_start {
+    pub struct_size: u32,
+    pub reserved: u32,
+    pub count: usize,
+    pub density: *const f64,
+    pub velocity: *const f64,
+    pub angular_velocity: *const f64,
+}
+
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct tandem_body_motion {
+    pub pose: tandem_pose,
+    pub centre: [f64; 3],
+    pub velocity: [f64; 3],
+    pub angular_velocity: [f64; 3],
+    pub sleeps: u8,
+    pub reserved: [u8; 7],
+}
+
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct tandem_world_contact {
+    pub a: u32,
+    pub b: u32,
+    pub position: [f64; 3],
+    pub normal: [f64; 3],
+    pub depth: f64,
+    pub impulse: [f64; 3],
+}
+
 #[link(name = "tandem")]
 extern "C" {
     pub fn tandem_version() -> u32;
@@ -677,4 +741,19 @@ extern "C" {
     pub fn tandem_scene_bodies_at(scene: *const tandem_scene, count: *mut usize) -> *const tandem_body_at;
     pub fn tandem_scene_find(scene: *mut tandem_scene, questions: *const tandem_questions) -> tandem_status;
     pub fn tandem_scene_get_counters(scene: *const tandem_scene, counters: *mut tandem_counters) -> tandem_status;
+    pub fn tandem_world_create(options: *const tandem_world_options, allocator: *const tandem_allocator, world: *mut *mut tandem_world) -> tandem_status;
+    pub fn tandem_world_destroy(world: *mut tandem_world);
+    pub fn tandem_world_set_assets(world: *mut tandem_world, assets: *const *mut tandem_asset, count: usize) -> tandem_status;
+    pub fn tandem_world_set_bodies(world: *mut tandem_world, instances: *const tandem_instance, count: usize, filter: *const tandem_pair_filter, start: *const tandem_body_start) -> tandem_status;
+    pub fn tandem_world_step(world: *mut tandem_world, dt: f64, steps: u32) -> tandem_status;
+    pub fn tandem_world_bodies(world: *const tandem_world, count: *mut usize) -> *const tandem_body_motion;
+    pub fn tandem_world_contacts(world: *const tandem_world, count: *mut usize) -> *const tandem_world_contact;
+    pub fn tandem_world_time(world: *const tandem_world) -> f64;
+    pub fn tandem_world_mass(world: *const tandem_world, body: u32) -> f64;
+    pub fn tandem_world_set_body(world: *mut tandem_world, body: u32, motion: *const tandem_body_motion) -> tandem_status;
+    pub fn tandem_world_push(world: *mut tandem_world, body: u32, impulse: *const f64, at: *const f64) -> tandem_status;
+    pub fn tandem_world_save(world: *const tandem_world, state: *mut *mut tandem_world_state) -> tandem_status;
+    pub fn tandem_world_restore(world: *mut tandem_world, state: *const tandem_world_state) -> tandem_status;
+    pub fn tandem_world_state_destroy(state: *mut tandem_world_state);
+    pub fn tandem_world_where(world: *const tandem_world) -> u64;
 }

@@ -44,3 +44,7 @@ struct Same_tandem_verdict { using Ours = PairVerdict; using Theirs = tandem_ver
 struct Same_tandem_tolerance_counters { using Ours = ToleranceCounters; using Theirs = tandem_tolerance_counters; TANDEM_SAME_SIZE();
   TANDEM_SAME(apart); TANDEM_SAME(touching); TANDEM_SAME(within_tolerance); TANDEM_SAME(work); };
 struct Same_tandem_body_at { using Ours = BodyAt; using Theirs = tandem_body_at; TANDEM_SAME_SIZE(); TANDEM_SAME(point); TANDEM_SAME(body); };
+struct Same_tandem_body_motion { using Ours = BodyMotion; using Theirs = tandem_body_motion; TANDEM_SAME_SIZE(); TANDEM_SAME(pose);
+  TANDEM_SAME(centre); TANDEM_SAME(velocity); TANDEM_SAME(angular_velocity); TANDEM_SAME(sleeps); };
+struct Same_tandem_world_contact { using Ours = WorldContact; using Theirs = tandem_world_contact; TANDEM_SAME_SIZE(); TANDEM_SAME(a); TANDEM_SAME(b);
+  TANDEM_SAME(position); TANDEM_SAME(normal); TANDEM_SAME(depth); TANDEM_SAME(impulse); };

@@ -3,6 +3,7 @@
 #include <span>
 
 #include "entry.h"
+#include "tandem/dynamics/world.h"
 #include "tandem/kernels/bodies_at_query.h"
 #include "tandem/kernels/containment_query.h"
 #include "tandem/kernels/distance_query.h"

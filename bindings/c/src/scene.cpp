@@ -3,6 +3,7 @@
 #include <bit>
 #include <utility>
 
+#include "bodies.h"
 #include "handles.h"
 #include "rows.h"
 
@@ -26,7 +27,7 @@ enum class Standing { none, some, all };
 
 struct tandem_scene : Allocated {
   Allocator allocator;
-  Buffer<tandem_asset*> assets;  // a reference to each
+  AssetReferences assets;
   const tandem_excluded_pairs* excluded = nullptr;
   uint64_t where = 0;
   Scene scene;
@@ -41,10 +42,7 @@ struct tandem_scene : Allocated {
   Asked<ToleranceQuery> verdicts;
   Asked<BodiesAtQuery> bodies_at;
 
-  ~tandem_scene() {
-    release_assets();
-    keep(nullptr);
-  }
+  ~tandem_scene() { keep(nullptr); }
 
   tandem_status fail(tandem_status status, uint64_t at) {
     where = at;
@@ -52,10 +50,6 @@ struct tandem_scene : Allocated {
   }
   tandem_status told(Status status) {
     return status == Status::kOk ? tandem_status{TANDEM_OK} : fail(to_c(status), scene.where());
-  }
-  void release_assets() {
-    for (tandem_asset* asset : assets.view()) tandem_asset_release(asset);
-    assets.clear();
   }
   void forget_contacts() {
     standing = Standing::none;
@@ -78,46 +72,6 @@ tandem_status enter(tandem_scene* scene, const Body& body) noexcept {
     self.where = 0;
     return body(self);
   });
-}
-
-// Takes references to these assets instead of those before. After an error there are none.
-tandem_status set_assets(tandem_scene& self, tandem_asset* const* assets, size_t count) {
-  tandem_status status = is_there(assets, count) ? TANDEM_OK : TANDEM_NULL_ARGUMENT;
-  for (size_t i = 0; i < count && status == TANDEM_OK; ++i) {
-    if (assets[i] == nullptr) status = self.fail(TANDEM_NULL_ARGUMENT, i);
-  }
-  // New assets are taken before old ones are released, because they may be the same.
-  Buffer<tandem_asset*> taken;
-  Buffer<AssetView> views;
-  if (status == TANDEM_OK && (!taken.resize(count) || !views.resize(count))) status = TANDEM_OUT_OF_MEMORY;
-  for (size_t i = 0; i < count && status == TANDEM_OK; ++i) {
-    tandem_asset_retain(taken[i] = assets[i]);
-    views[i] = assets[i]->view;
-  }
-  self.release_assets();
-  if (status == TANDEM_OK) {
-    self.assets = std::move(taken);
-    status = self.told(self.scene.set_assets(views.view()));
-  }
-  if (status == TANDEM_OK) return status;
-  (void)self.scene.set_assets({});
-  self.release_assets();
-  return status;
-}
-
-// The filter of so many bodies, which is zeros where none is given. Result: TANDEM_OK,
-// TANDEM_BAD_STRUCT_SIZE, TANDEM_BAD_OPTION, TANDEM_BAD_MOTION, where `where` is the body, or
-// TANDEM_FILTER_MISMATCH.
-tandem_status read_filter(const tandem_pair_filter* given, size_t bodies, tandem_pair_filter& read,
-                          uint64_t& where) {
-  if (const tandem_status status = read_struct(given, read); status != TANDEM_OK) return status;
-  if (read.reserved != 0) return TANDEM_BAD_OPTION;
-  const bool has_rows = read.motion != nullptr || read.group != nullptr || read.mask != nullptr;
-  if (has_rows && read.count != bodies) return TANDEM_FILTER_MISMATCH;
-  const size_t unknown = read.motion != nullptr ? first_unknown_motion(read.motion, bodies) : bodies;
-  if (unknown == bodies) return TANDEM_OK;
-  where = unknown;
-  return TANDEM_BAD_MOTION;
 }
 
 tandem_status place(tandem_scene& self, const tandem_instance* instances, size_t count,
@@ -295,7 +249,9 @@ tandem_status tandem_scene_set_assets(tandem_scene* scene, tandem_asset* const* 
         self.bodies_at.found = false;
     // Points of before are not those of other assets.
     self.manifolds.query.forget_points();
-    const tandem_status status = set_assets(self, assets, count);
+    const tandem_status status = self.assets.replace(
+        assets, count, self.where,
+        [&](std::span<const AssetView> views) { return self.told(self.scene.set_assets(views)); });
     self.keep(nullptr);
     return status;
   });

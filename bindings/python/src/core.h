@@ -87,5 +87,6 @@ void add_mujoco(nb::module_& module);
 void add_readers(nb::module_& module);
 void add_scenes(nb::module_& module);
 void add_touches(nb::module_& module);
+void add_worlds(nb::module_& module);
 
 }  // namespace tandem::python

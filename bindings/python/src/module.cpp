@@ -16,4 +16,5 @@ NB_MODULE(_tandem, module) {
   tandem::python::add_readers(module);
   tandem::python::add_scenes(module);
   tandem::python::add_touches(module);
+  tandem::python::add_worlds(module);
 }

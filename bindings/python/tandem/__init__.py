@@ -1,4 +1,4 @@
-"""Exact collision detection of posed triangle meshes: contacts, manifolds, distances, times of impact.
+"""Exact collision detection of posed triangle meshes: contacts, manifolds, distances, times of impact; and worlds of rigid bodies.
 
 In the examples of the docstrings, `box` is a cube of unit length with a corner at 0, `scene` is tandem.Scene([box]), and `np` is NumPy.
 
@@ -15,8 +15,9 @@ from ._arrays import instances, rotations
 from ._asset import Asset, Level, Part
 from ._build import BuildReport, Mesh, build, read_mesh
 from ._errors import Error, FileError
-from ._rows import BODY_AT, CONTACT, CONTAINMENT, DISTANCE, FORMER, IMPACT, INSTANCE, MANIFOLD, MOTION, NO_INDEX, PAIR, POINT, VERDICT
+from ._rows import BODY_AT, BODY_MOTION, CONTACT, CONTAINMENT, DISTANCE, FORMER, IMPACT, INSTANCE, MANIFOLD, MOTION, NO_INDEX, PAIR, POINT, VERDICT, WORLD_CONTACT
 from ._scene import Contacts, Contained, Counters, Distances, Filter, Impacts, Manifolds, Moved, Scene, Verdicts
+from ._world import World, WorldState
 
 #: Says what moves a body (Filter): forces; nothing; the caller; nothing until the caller wakes it.
 MOVING, FIXED, KINEMATIC, SLEEPING = range(4)
@@ -47,8 +48,8 @@ def view(what: _Any, instances: _Any = None, **options: _Any) -> _Any:
 __version__ = f"{_tandem.version // 10000}.{_tandem.version // 100 % 100}.{_tandem.version % 100}"
 
 __all__ = [
-    "AMBIGUOUS", "APART", "CONTACT", "CONTAINMENT", "DISTANCE", "FIXED", "FORMER", "GOES_THROUGH", "IMPACT", "IMPACT_AT_START", "IMPACT_IN_STEP", "INSIDE", "INSTANCE",
+    "AMBIGUOUS", "APART", "BODY_MOTION", "CONTACT", "CONTAINMENT", "DISTANCE", "FIXED", "FORMER", "GOES_THROUGH", "IMPACT", "IMPACT_AT_START", "IMPACT_IN_STEP", "INSIDE", "INSTANCE",
     "KINEMATIC", "MANIFOLD", "MOTION", "MOVING", "NO_IMPACT", "NO_INDEX", "OPEN_CURVE", "OUTER_OPEN", "PAIR", "POINT", "SLEEPING", "TOUCH", "TOUCHING", "VERDICT",
-    "WITHIN_TOLERANCE", "Asset", "BuildReport", "Contacts", "Contained", "Counters", "Distances", "Error", "FileError", "Filter", "Impacts", "Level", "Manifolds", "Mesh",
-    "Moved", "Part", "Scene", "Verdicts", "build", "instances", "read_mesh", "rotations", "view",
+    "WITHIN_TOLERANCE", "WORLD_CONTACT", "Asset", "BuildReport", "Contacts", "Contained", "Counters", "Distances", "Error", "FileError", "Filter", "Impacts", "Level", "Manifolds", "Mesh",
+    "Moved", "Part", "Scene", "Verdicts", "World", "WorldState", "build", "instances", "read_mesh", "rotations", "view",
 ]

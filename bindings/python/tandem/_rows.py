@@ -2,7 +2,7 @@
 wherever it copies. Written by scripts/write_interface from it. Do not edit it."""
 import numpy as np
 
-__all__ = ["BODY_AT", "CONTACT", "CONTAINMENT", "DISTANCE", "FORMER", "IMPACT", "INSTANCE", "MANIFOLD", "MOTION", "NO_INDEX", "PAIR", "POINT", "VERDICT"]
+__all__ = ["BODY_AT", "BODY_MOTION", "CONTACT", "CONTAINMENT", "DISTANCE", "FORMER", "IMPACT", "INSTANCE", "MANIFOLD", "MOTION", "NO_INDEX", "PAIR", "POINT", "VERDICT", "WORLD_CONTACT"]
 
 #: What is not there: a triangle, a face, a former point, the asset of a removed body.
 NO_INDEX = 0xFFFFFFFF
@@ -35,3 +35,9 @@ IMPACT = np.dtype([("t_safe", "<f8"), ("gap", "<f8"), ("point_a", "<f8", (3,)), 
 VERDICT = np.dtype([("verdict", "u1"), ("level_a", "u1"), ("level_b", "u1")])
 #: A body whose world box contains a point.
 BODY_AT = np.dtype([("point", "<u4"), ("body", "<u4")])
+#: Where a body is, and how it moves. The place of a body: world = rotation x + translation, x in the mesh file's coordinates; rows of the rotation
+#: are consecutive. Rigid to 1e-6, else TANDEM_POSE_NOT_RIGID.
+BODY_MOTION = np.dtype([("rotation", "<f8", (3, 3)), ("translation", "<f8", (3,)), ("centre", "<f8", (3,)), ("velocity", "<f8", (3,)),
+        ("angular_velocity", "<f8", (3,)), ("sleeps", "u1"), ("reserved", "u1", (7,))])
+#: A point where two bodies touch, or nearly so, and what they did there in the last step.
+WORLD_CONTACT = np.dtype([("a", "<u4"), ("b", "<u4"), ("position", "<f8", (3,)), ("normal", "<f8", (3,)), ("depth", "<f8"), ("impulse", "<f8", (3,))])

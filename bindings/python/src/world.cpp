@@ -1,0 +1,199 @@
+#include <chrono>
+#include <memory>
+
+#include "core.h"
+
+namespace tandem::python {
+namespace {
+
+// What a world was at some time.
+class WorldState {
+ public:
+  explicit WorldState(tandem_world_state* state) : state_(state, tandem_world_state_destroy) {}
+  const tandem_world_state* get() const { return state_.get(); }
+
+ private:
+  std::unique_ptr<tandem_world_state, decltype(&tandem_world_state_destroy)> state_;
+};
+
+// One number of an option, or where there is None, its default, which is 0; the flag says that 0 is meant.
+double option_of(nb::handle given, std::uint32_t& is_zero) {
+  const double number = given.is_none() ? 0 : nb::cast<double>(given);
+  is_zero = !given.is_none() && number == 0;
+  return number;
+}
+
+// Rows of `width` numbers for each of so many bodies, or none.
+std::vector<double> numbers_of(nb::handle given, std::size_t bodies, std::size_t width) {
+  if (given.is_none()) return {};
+  std::vector<double> numbers = copy_rows<double>(given);
+  if (numbers.size() != bodies * width) throw_broken_rows();
+  return numbers;
+}
+
+class World {
+ public:
+  World(nb::list assets, nb::handle gravity, nb::handle friction, double restitution, nb::handle slop,
+        nb::handle rolling_resistance, std::uint32_t substeps, bool sleeping, bool continuous,
+        std::uint32_t threads) {
+    std::vector<tandem_asset*> list;
+    for (nb::handle asset : assets) list.push_back(nb::cast<const Asset&>(asset).get());
+    auto options = sized<tandem_world_options>();
+    options.no_gravity = 1;
+    const std::vector<double> pull = numbers_of(gravity, 1, 3);
+    for (std::size_t i = 0; i < pull.size(); ++i) {
+      options.gravity[i] = pull[i];
+      if (pull[i] != 0) options.no_gravity = 0;
+    }
+    options.friction = option_of(friction, options.no_friction);
+    options.slop = option_of(slop, options.no_slop);
+    options.rolling_resistance = option_of(rolling_resistance, options.no_rolling_resistance);
+    options.restitution = restitution;
+    options.substeps = substeps;
+    options.no_sleeping = !sleeping;
+    options.continuous = continuous;
+    options.threads = threads;
+    tandem_world* made = nullptr;
+    check(tandem_world_create(&options, nullptr, &made));
+    world_.reset(made);
+    ask([&](tandem_world* world) { return tandem_world_set_assets(world, list.data(), list.size()); });
+  }
+
+  void set_bodies(nb::handle instances, const Filter* filter, nb::handle density, nb::handle velocity,
+                  nb::handle angular_velocity) {
+    const Turn turn = take_turn();
+    const auto rows = copy_rows<tandem_instance>(instances);
+    const std::vector<double> densities = numbers_of(density, rows.size(), 1),
+                              velocities = numbers_of(velocity, rows.size(), 3),
+                              angular = numbers_of(angular_velocity, rows.size(), 3);
+    auto start = sized<tandem_body_start>();
+    start.count = rows.size();
+    if (!densities.empty()) start.density = densities.data();
+    if (!velocities.empty()) start.velocity = velocities.data();
+    if (!angular.empty()) start.angular_velocity = angular.data();
+    ask([&](tandem_world* world) {
+      return tandem_world_set_bodies(world, rows.data(), rows.size(), Filter::of(filter), &start);
+    });
+  }
+
+  // Looks for signals now and then, between steps.
+  void step(double dt, std::uint64_t steps) {
+    using Clock = std::chrono::steady_clock;
+    const Turn turn = take_turn();
+    std::uint64_t done = 0;
+    do {
+      ask([&](tandem_world* world) {
+        const auto soon = Clock::now() + std::chrono::milliseconds(50);
+        tandem_status status = TANDEM_OK;
+        do {
+          status = tandem_world_step(world, dt, done < steps);
+        } while (status == TANDEM_OK && ++done < steps && Clock::now() < soon);
+        return status;
+      });
+      if (PyErr_CheckSignals() != 0) throw nb::python_error();
+    } while (done < steps);
+  }
+
+  void set_body(std::uint32_t body, nb::handle motion) {
+    const Turn turn = take_turn();
+    const auto rows = copy_rows<tandem_body_motion>(motion);
+    if (rows.size() != 1) throw_broken_rows();
+    ask([&](tandem_world* world) { return tandem_world_set_body(world, body, rows.data()); });
+  }
+
+  void push(std::uint32_t body, nb::handle impulse, nb::handle at) {
+    const Turn turn = take_turn();
+    const std::vector<double> by = numbers_of(impulse, 1, 3), point = numbers_of(at, 1, 3);
+    ask([&](tandem_world* world) { return tandem_world_push(world, body, by.data(), point.data()); });
+  }
+
+  nb::object bodies() { return rows<tandem_world_bodies>(); }
+  nb::object contacts() { return rows<tandem_world_contacts>(); }
+
+  std::size_t count() {
+    const Turn turn = take_turn();
+    return body_count();
+  }
+
+  double time() {
+    const Turn turn = take_turn();
+    return tandem_world_time(world_.get());
+  }
+
+  nb::object masses() {
+    const Turn turn = take_turn();
+    std::vector<double> masses(body_count());
+    for (std::size_t i = 0; i < masses.size(); ++i)
+      masses[i] = tandem_world_mass(world_.get(), static_cast<std::uint32_t>(i));
+    return to_python(masses.data(), masses.size());
+  }
+
+  WorldState save() {
+    const Turn turn = take_turn();
+    tandem_world_state* state = nullptr;
+    ask([&](tandem_world* world) { return tandem_world_save(world, &state); });
+    return WorldState(state);
+  }
+
+  void restore(const WorldState& state) {
+    const Turn turn = take_turn();
+    ask([&](tandem_world* world) { return tandem_world_restore(world, state.get()); });
+  }
+
+ private:
+  Turn take_turn() { return Turn(busy_, "another thread is in a call of this world"); }
+
+  std::size_t body_count() const {
+    std::size_t bodies;
+    tandem_world_bodies(world_.get(), &bodies);
+    return bodies;
+  }
+
+  // Makes a call of the C interface without the interpreter's lock.
+  template <typename Call>
+  void ask(const Call& call) {
+    tandem_world* const world = world_.get();
+    const tandem_status status = [&] {
+      const WithoutLock other_threads_run;
+      return call(world);
+    }();
+    if (status != TANDEM_OK) check(status, tandem_world_where(world));
+  }
+
+  // A copy of rows, as a bytearray: NumPy makes an array of it that owns it.
+  template <auto get>
+  nb::object rows() {
+    const Turn turn = take_turn();
+    std::size_t count;
+    const auto* first = get(world_.get(), &count);
+    return to_python(first, count);
+  }
+
+  std::unique_ptr<tandem_world, decltype(&tandem_world_destroy)> world_{nullptr, tandem_world_destroy};
+  std::atomic<bool> busy_ = false;
+};
+
+}  // namespace
+
+void add_worlds(nb::module_& module) {
+  const auto none = [] { return nb::arg().none(); };
+  nb::class_<WorldState>(module, "WorldState");
+  nb::class_<World>(module, "World")
+      .def(nb::init<nb::list, nb::handle, nb::handle, double, nb::handle, nb::handle, std::uint32_t, bool,
+                    bool, std::uint32_t>(),
+           nb::arg(), nb::arg(), nb::arg(), nb::arg(), none(), none(), nb::arg(), nb::arg(), nb::arg(),
+           nb::arg())
+      .def("set_bodies", &World::set_bodies, nb::arg(), none(), none(), none(), none())
+      .def("step", &World::step)
+      .def("set_body", &World::set_body)
+      .def("push", &World::push)
+      .def("bodies", &World::bodies)
+      .def("contacts", &World::contacts)
+      .def("count", &World::count)
+      .def("time", &World::time)
+      .def("masses", &World::masses)
+      .def("save", &World::save)
+      .def("restore", &World::restore);
+}
+
+}  // namespace tandem::python

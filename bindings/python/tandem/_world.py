@@ -1,0 +1,266 @@
+"""Worlds: rigid bodies that move under gravity and contacts."""
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _tandem
+from ._arrays import Rotations, Rows, amount, flag, floats, instances_of, number, whole_number
+from ._asset import Asset
+from ._errors import Error
+from ._poses import explained
+from ._rows import BODY_MOTION, INSTANCE, WORLD_CONTACT
+from ._scene import Filter, _core_of, cores_of
+
+__all__ = ["World", "WorldState"]
+
+_MOST = 1e6  # of options that are numbers
+_Numbers = npt.NDArray[np.float64]
+
+
+class WorldState:
+    """What `World.save` keeps: all that the next steps depend on."""
+
+    __slots__ = ("_core",)
+
+    def __init__(self, core: _tandem.WorldState):
+        self._core = core
+
+
+def _gravity(value: npt.ArrayLike) -> _Numbers:
+    gravity = _vector(value, "gravity")
+    if not (np.abs(gravity) <= _MOST).all():
+        raise ValueError(f"gravity is {gravity.tolist()} where numbers of -{_MOST:g} to {_MOST:g} are wanted")
+    return gravity
+
+
+def _vector(value: npt.ArrayLike, name: str) -> _Numbers:
+    vector = floats(value, name, 3)
+    if vector.shape != (3,):
+        raise ValueError(f"{name} has shape {vector.shape} where (3,) is wanted")
+    return vector
+
+
+def _of_each(value: npt.ArrayLike | None, name: str, bodies: int, *tail: int) -> _Numbers | None:
+    """The same for all bodies, or a row for each."""
+    if value is None:
+        return None
+    given = floats(value, name, *tail)
+    if given.ndim > len(tail) and len(given) not in (1, bodies):
+        raise ValueError(f"{name} has {len(given)} rows where there are {bodies} bodies")
+    return np.ascontiguousarray(np.broadcast_to(given, (bodies, *tail)))
+
+
+class World:
+    """Rigid bodies that move under gravity and contacts, which are exact, for any meshes. Lengths are metres, masses kilograms, times seconds, angles radians.
+
+    Args:
+        assets: that bodies refer to by their place in this list. The world keeps them.
+        instances, filter, asset, rotation, translation, transform, density, velocity, angular_velocity: bodies, as of `place`; none where none of the poses is
+            given.
+        gravity: (3,).
+        friction: Coulomb's coefficient.
+        restitution: part of the speed that an impact gives back, 0 to 1.
+        slop: overlap that is left alone; None: 1/4000 of the least diagonal of an asset of a moving body.
+        rolling_resistance: lever at which the force between two bodies resists that they turn against each other; None: 16 slops.
+        substeps: parts of a step that share its contacts, 1 to 10,000.
+        sleeping: bodies that rest with all that they touch are left alone.
+        continuous: fast bodies are carried to where they first meet others.
+        threads: that a call may use, 1 to 1,024, the caller's thread included. Results do not depend on it.
+
+    Calls let other Python threads run. A world takes one call at a time: a second thread gets RuntimeError; several worlds may share assets.
+
+    >>> fixed = tandem.Filter(motion=[tandem.FIXED, tandem.MOVING])
+    >>> world = tandem.World([box], translation=[[0, 0, 0], [0.25, 0, 1.5]], filter=fixed)
+    >>> world.step(1 / 60, 120)
+    >>> world.translation[1].round(2).tolist(), world.sleeping.tolist()
+    ([0.25, 0.0, 1.0], [False, True])
+    """
+
+    __slots__ = ("_asset", "_core", "__weakref__")
+
+    def __init__(self, assets: Iterable[Asset], instances: Rows | None = None, *, filter: Filter | None = None, asset: npt.ArrayLike | None = None,
+                 rotation: Rotations | None = None, translation: npt.ArrayLike | None = None, transform: npt.ArrayLike | None = None,
+                 density: npt.ArrayLike = 1000.0, velocity: npt.ArrayLike | None = None, angular_velocity: npt.ArrayLike | None = None,
+                 gravity: npt.ArrayLike = (0.0, 0.0, -9.81), friction: float = 0.5, restitution: float = 0.0, slop: float | None = None,
+                 rolling_resistance: float | None = None, substeps: int = 16, sleeping: bool = True, continuous: bool = False, threads: int = 1):
+        self._core = _tandem.World(
+            cores_of(assets), _gravity(gravity), amount(friction, "friction", _MOST), amount(restitution, "restitution", 1.0),
+            None if slop is None else amount(slop, "slop", _MOST),
+            None if rolling_resistance is None else amount(rolling_resistance, "rolling_resistance", _MOST), whole_number(substeps, "substeps", 1, 10_000),
+            flag(sleeping, "sleeping"), flag(continuous, "continuous"), whole_number(threads, "threads", 1, 1024))
+        self._asset = np.zeros(0, np.uint32)
+        if not (instances is None and asset is None and rotation is None and translation is None and transform is None):
+            self.place(instances, filter=filter, asset=asset, rotation=rotation, translation=translation, transform=transform, density=density, velocity=velocity,
+                       angular_velocity=angular_velocity)
+        elif filter is not None or velocity is not None or angular_velocity is not None:
+            raise TypeError("instances is missing, or asset, rotation, translation or transform")
+
+    def place(self, instances: Rows | None = None, *, filter: Filter | None = None, asset: npt.ArrayLike | None = None, rotation: Rotations | None = None,
+              translation: npt.ArrayLike | None = None, transform: npt.ArrayLike | None = None, density: npt.ArrayLike = 1000.0,
+              velocity: npt.ArrayLike | None = None, angular_velocity: npt.ArrayLike | None = None) -> World:
+        """Places all bodies anew, at time 0. Returns the world.
+
+        Args:
+            instances: array of INSTANCE, or instead of it `asset`, `rotation`, `translation` or `transform` (see `tandem.instances`).
+            filter: what moves bodies, and which of them meet. A kinematic body keeps its velocities; a sleeping one starts awake.
+            density: () or (n,), of bodies that move. The mass is that of what the mesh encloses; an open mesh is a shell, a hundredth of its diagonal thick.
+            velocity: (3,) or (n, 3), of the centre of mass; 0 where it is not given.
+            angular_velocity: (3,) or (n, 3); 0 where it is not given.
+
+        Raises:
+            Error: as of `Scene.place`; a velocity that is not finite; a moving body whose mesh has no topology or no extent, or whose density is not positive. There
+                are no bodies then.
+        """
+        bodies = instances_of(instances, asset, rotation, translation, transform)
+        given = (_of_each(density, "density", len(bodies)), _of_each(velocity, "velocity", len(bodies), 3),
+                 _of_each(angular_velocity, "angular_velocity", len(bodies), 3))
+        self._asset = np.zeros(0, np.uint32)
+        try:
+            self._core.set_bodies(bodies, _core_of(filter), *given)
+        except Error as error:
+            raise explained(error, bodies) from None
+        self._asset = bodies["asset"].copy()
+        return self
+
+    def step(self, dt: float, steps: int = 1) -> None:
+        """Makes steps of dt seconds, from more than 0 to 1000. Ctrl-C, and an error, leave the bodies as after the last step that was whole.
+
+        Raises:
+            Error: a body has left the range of numbers that questions take; `where` is the body.
+        """
+        duration = number(dt, "dt")
+        if not 0 < duration <= 1000:
+            raise ValueError(f"dt is {duration} where more than 0 and at most 1000 is wanted")
+        count = whole_number(steps, "steps", 0, 2**63)
+        if count:
+            self._core.step(duration, count)
+
+    def move(self, body: int, *, rotation: Rotations | None = None, translation: npt.ArrayLike | None = None, transform: npt.ArrayLike | None = None,
+             velocity: npt.ArrayLike | None = None, angular_velocity: npt.ArrayLike | None = None) -> None:
+        """Puts a body elsewhere or gives it other velocities, and wakes it.
+
+        Args:
+            rotation, translation, transform: of one body (see `tandem.instances`); it stays where none of these is given.
+            velocity, angular_velocity: (3,); each stays where it is not given.
+
+        Raises:
+            Error: a pose that is not rigid, or a number that is not finite. Nothing has changed then.
+
+        >>> world = tandem.World([box], translation=[0, 0, 5])
+        >>> world.move(0, velocity=[1, 0, 0])
+        >>> world.step(0.5)
+        >>> world.translation.round(3)[0, 0]
+        0.5
+        """
+        row = self._body(body)
+        motion = self.bodies[row:row + 1].copy()
+        if not (rotation is None and translation is None and transform is None):
+            pose = instances_of(None, None, rotation, translation, transform)
+            if len(pose) != 1:
+                raise ValueError(f"{len(pose)} poses where one is wanted")
+            motion["rotation"], motion["translation"] = pose["rotation"], pose["translation"]
+        for name, value in (("velocity", velocity), ("angular_velocity", angular_velocity)):
+            if value is not None:
+                motion[name] = _vector(value, name)
+        try:
+            self._core.set_body(row, motion)
+        except Error as error:
+            raise explained(error, np.broadcast_to(motion, row + 1)) from None
+
+    def push(self, body: int, impulse: npt.ArrayLike, at: npt.ArrayLike | None = None) -> None:
+        """Adds to a moving body's velocities what an impulse does, and wakes it. Others stay as they are.
+
+        Args:
+            impulse: (3,), newton seconds.
+            at: (3,), the point of the world where it acts; None: the centre of mass.
+        """
+        row = self._body(body)
+        self._core.push(row, _vector(impulse, "impulse"), np.ascontiguousarray(self.bodies["centre"][row]) if at is None else _vector(at, "at"))
+
+    def save(self) -> WorldState:
+        """Keeps all that the next steps depend on."""
+        return WorldState(self._core.save())
+
+    def restore(self, state: WorldState) -> None:
+        """Goes back to a state of this world that was saved since its bodies were placed, else Error. There are no contacts until the next step.
+
+        >>> world = tandem.World([box], translation=[0, 0, 5])
+        >>> start = world.save()
+        >>> world.step(0.1, steps=5)
+        >>> world.restore(start)
+        >>> world.time, world.translation.tolist()
+        (0.0, [[0.0, 0.0, 5.0]])
+        """
+        if not isinstance(state, WorldState):
+            raise TypeError(f"state is {type(state).__name__} where a tandem.WorldState is wanted")
+        self._core.restore(state._core)
+
+    def _body(self, body: int) -> int:
+        count = self._core.count()
+        if count == 0:
+            raise ValueError("there are no bodies")
+        return whole_number(body, "body", 0, count - 1)
+
+    @property
+    def bodies(self) -> Rows:
+        """The bodies by number, a copy, array of BODY_MOTION: poses, centres of mass, velocities, and whether they sleep."""
+        return np.frombuffer(self._core.bodies(), BODY_MOTION)
+
+    @property
+    def rotation(self) -> _Numbers:
+        """(n, 3, 3) of the bodies."""
+        return np.ascontiguousarray(self.bodies["rotation"])
+
+    @property
+    def translation(self) -> _Numbers:
+        """(n, 3) of the bodies."""
+        return np.ascontiguousarray(self.bodies["translation"])
+
+    @property
+    def velocity(self) -> _Numbers:
+        """(n, 3), of the centres of mass."""
+        return np.ascontiguousarray(self.bodies["velocity"])
+
+    @property
+    def angular_velocity(self) -> _Numbers:
+        """(n, 3), in the world."""
+        return np.ascontiguousarray(self.bodies["angular_velocity"])
+
+    @property
+    def sleeping(self) -> npt.NDArray[np.bool_]:
+        """(n,), which bodies rest with all that they touch, and are not looked at until they are touched."""
+        sleeps: npt.NDArray[np.bool_] = self.bodies["sleeps"] != 0
+        return sleeps
+
+    @property
+    def instances(self) -> Rows:
+        """The bodies by number, a copy, array of INSTANCE: what `tandem.view` and scenes take."""
+        bodies = self.bodies
+        made = np.zeros(len(bodies), INSTANCE)
+        made["asset"], made["rotation"], made["translation"] = self._asset, bodies["rotation"], bodies["translation"]
+        return made
+
+    @property
+    def mass(self) -> _Numbers:
+        """(n,); 0 of bodies that contacts do not move."""
+        return np.frombuffer(self._core.masses(), np.float64)
+
+    @property
+    def contacts(self) -> Rows:
+        """The contacts that the last step solved, a copy, array of WORLD_CONTACT by ascending pair of bodies; not those of two sleeping bodies.
+
+        >>> world = tandem.World([box], translation=[[0, 0, 0], [0, 0, 1]], filter=tandem.Filter(motion=[tandem.FIXED, tandem.MOVING]))
+        >>> world.step(1 / 60)
+        >>> weight = world.contacts["impulse"].sum(axis=0) * 60
+        >>> weight.round(-1).tolist()
+        [0.0, 0.0, 9810.0]
+        """
+        return np.frombuffer(self._core.contacts(), WORLD_CONTACT)
+
+    @property
+    def time(self) -> float:
+        """The seconds of all steps since bodies were placed."""
+        return self._core.time()

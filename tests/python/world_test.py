@@ -1,0 +1,232 @@
+"""Worlds: bodies come to rest, what is asked of them, wrong calls, threads and Ctrl-C."""
+import itertools
+import os
+import signal
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import solids
+import tandem
+
+ASSETS = Path(os.environ["TANDEM_SOURCE_DIR"]) / "assets"
+HALF = 0.5
+BOX = tandem.build(*solids.box(HALF, HALF, HALF))
+FLOOR = tandem.build(*solids.box(10, 10, HALF))
+FIRST_FIXED = tandem.Filter(motion=[tandem.FIXED, tandem.MOVING])
+
+
+def pair(height=1.0, **options):
+    """A box so high above a fixed one."""
+    return tandem.World([BOX], translation=[[0, 0, 0], [0.2, 0.1, height]], filter=FIRST_FIXED, **options)
+
+
+def pile(count=100, threads=1, asset=BOX, spacing=1.2, size=5):
+    """Turned bodies above a floor."""
+    places = np.array(list(itertools.islice(itertools.product(range(count), range(size), range(size)), count)))[:, ::-1]
+    places = spacing * (places - [(size - 1) / 2, (size - 1) / 2, -1])
+    turns = tandem.rotations(xyzw=np.random.default_rng(2).normal(size=(count, 4)))
+    return tandem.World([FLOOR, asset], asset=[0] + count * [1], translation=[[0, 0, -HALF], *places], rotation=[np.eye(3), *turns],
+                        filter=tandem.Filter(motion=[tandem.FIXED] + count * [tandem.MOVING]), threads=threads)
+
+
+def states(world):
+    return world.bodies.tobytes() + world.contacts.tobytes()
+
+
+def test_a_pile_comes_to_rest():
+    world = pile()
+    while not world.sleeping[1:].all() and world.time < 20:
+        world.step(1 / 60, 30)
+    assert world.sleeping[1:].all() and (world.velocity == 0).all() and (world.angular_velocity == 0).all()
+    assert world.rotation.shape == (101, 3, 3) and world.translation.shape == (101, 3) and not world.sleeping[0]
+    assert world.translation[1:, 2].min() > HALF - 0.01
+    # At rest they overlap by little, as the scene says, which takes the same bodies.
+    depth = tandem.Scene([FLOOR, BOX], world.instances).manifolds().manifolds["depth"]
+    assert len(depth) >= 100 and depth.max() < 0.01
+
+
+def test_cows_come_to_rest():
+    mesh = tandem.read_mesh(ASSETS / "cow_1500.obj")
+    world = pile(12, asset=tandem.build(mesh.vertices, mesh.triangles), size=2)
+    while not world.sleeping[1:].all() and world.time < 20:
+        world.step(1 / 60, 30)
+    assert world.sleeping[1:].all() and world.translation[1:, 2].max() < 4
+
+
+def test_masses_and_contacts():
+    world = pair(density=[1, 500])
+    assert world.mass.round(6).tolist() == [0, 500]
+    world.step(1 / 60, 5)
+    contacts = world.contacts
+    assert contacts.dtype == tandem.WORLD_CONTACT and (contacts["a"] == 0).all() and (contacts["b"] == 1).all() and len(contacts) >= 3
+    assert np.allclose(contacts["normal"], [0, 0, 1], atol=1e-2)
+    assert np.allclose(contacts["impulse"].sum(axis=0) * 60, [0, 0, 500 * 9.81], atol=5)
+    assert world.time == pytest.approx(5 / 60)
+    sheet = tandem.build([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
+    assert tandem.World([sheet], translation=np.zeros(3), density=100).mass == pytest.approx([100 * 0.01 * 2 ** 0.5])
+
+
+def test_options():
+    thrown = tandem.World([BOX], translation=np.zeros(3), velocity=[1, 0, 0], angular_velocity=[[0, 0, 2]], gravity=np.zeros(3))
+    thrown.step(0.01, 100)
+    assert np.allclose(thrown.translation, [[1, 0, 0]]) and np.allclose(thrown.angular_velocity, [[0, 0, 2]])
+    assert np.allclose(thrown.rotation[0], [[np.cos(2), -np.sin(2), 0], [np.sin(2), np.cos(2), 0], [0, 0, 1]], atol=1e-3)
+    for friction, slides in ((0, True), (0.9, False)):
+        world = pair(friction=friction, gravity=[1, 0, -9.81], sleeping=False)
+        world.step(1 / 60, 30)
+        assert (world.translation[1, 0] > 0.25) == slides
+    bouncing = pair(1.5, restitution=0.9, slop=0.0, rolling_resistance=0.0, substeps=8)
+    bouncing.step(1 / 240, 130)
+    assert bouncing.velocity[1, 2] > 1 or bouncing.translation[1, 2] > 1.05
+    assert not pair(sleeping=False).sleeping.any()
+    bullet = pair(1000, velocity=[[0, 0, 0], [0, 0, -900]], continuous=True, gravity=[0, 0, 0])
+    bullet.step(1 / 10, 20)
+    assert bullet.translation[1, 2] > 0.9
+
+
+def test_bodies_are_pushed_and_moved():
+    world = pair()
+    world.step(1 / 60, 60)
+    assert world.sleeping[1]
+    world.push(1, [1000, 0, 0])
+    assert world.velocity[1].round(6).tolist() == [1, 0, 0] and (world.angular_velocity[1] == 0).all() and not world.sleeping[1]
+    world.push(1, [-1000, 0, 0], at=world.translation[1] + [0, 0, HALF])
+    assert world.velocity[1].round(6).tolist() == [0, 0, 0] and world.angular_velocity[1].round(6).tolist() == [0, -3, 0]
+    world.push(0, [1e6, 0, 0])
+    assert (world.velocity[0] == 0).all()
+    world.move(1, translation=[0, 0, 3])
+    assert world.translation[1].tolist() == [0, 0, 3] and world.angular_velocity[1].round(6).tolist() == [0, -3, 0]
+    world.move(1, velocity=[0, 0, 0], angular_velocity=[0, 0, 0])
+    world.step(1 / 60, 120)
+    assert np.allclose(world.translation[1], [0, 0, 1], atol=1e-3)
+    belt = tandem.World([BOX], translation=np.zeros((1, 3)), velocity=[0, 1, 0], filter=tandem.Filter(motion=[tandem.KINEMATIC]))
+    belt.step(0.1, 10)
+    assert np.allclose(belt.translation, [[0, 1, 0]])
+
+
+def test_filters_and_no_bodies():
+    world = tandem.World([BOX], translation=[[0, 0, 0], [0, 0, 1]], filter=tandem.Filter(motion=[tandem.FIXED, tandem.SLEEPING], excluded=[[1, 0]]))
+    world.step(1 / 60, 30)
+    assert world.translation[1, 2] < 0.5 and len(world.contacts) == 0
+    world = tandem.World([BOX], translation=[[0, 0, 0], [0, 0, 1]], filter=tandem.Filter(motion=[tandem.FIXED, tandem.MOVING], group=[1, 2], mask=[1, 1]))
+    world.step(1 / 60, 30)
+    assert world.translation[1, 2] < 0.5
+    assert world.place(translation=np.zeros(3)).translation.tolist() == [[0, 0, 0]] and world.time == 0
+    empty = tandem.World([])
+    empty.step(0.1, 10)
+    assert empty.rotation.shape == (0, 3, 3) and len(empty.contacts) == len(empty.instances) == len(empty.mass) == 0
+
+
+def test_results_do_not_depend_on_threads_or_calls():
+    one, two, several = pile(40), pile(40, threads=2), pile(40)
+    one.step(1 / 60, 45)
+    two.step(1 / 60, 45)
+    for _ in range(45):
+        several.step(1 / 60)
+    assert states(one) == states(two) == states(several)
+
+
+def test_a_restored_world_goes_on_alike():
+    world = pile(30)
+    world.step(1 / 60, 30)
+    kept = world.save()
+    world.step(1 / 60, 30)
+    then = states(world)
+    for _ in range(2):
+        world.restore(kept)
+        assert world.time == pytest.approx(0.5) and len(world.contacts) == 0
+        world.step(1 / 60, 30)
+        assert states(world) == then
+    for other in (pair(), world.place(world.instances)):
+        with pytest.raises(tandem.Error, match="is kept is of other") as caught:
+            other.restore(kept)
+        assert caught.value.name == "KeptMismatch"
+
+
+@pytest.mark.parametrize("call, error, words", [
+    (lambda w: tandem.World(BOX), TypeError, "assets is one asset"),
+    (lambda w: tandem.World([BOX], speed=1), TypeError, "speed"),
+    (lambda w: tandem.World([BOX], filter=FIRST_FIXED), TypeError, "instances is missing"),
+    (lambda w: tandem.World([BOX], gravity=9.81), ValueError, r"gravity has shape \(\)"),
+    (lambda w: tandem.World([BOX], gravity=[0, 0, np.nan]), ValueError, "gravity is"),
+    (lambda w: tandem.World([BOX], friction=-1), ValueError, "friction is -1"),
+    (lambda w: tandem.World([BOX], restitution=1.5), ValueError, "restitution is 1.5 where 0 to 1.0"),
+    (lambda w: tandem.World([BOX], slop=np.nan), ValueError, "slop is nan"),
+    (lambda w: tandem.World([BOX], rolling_resistance="x"), TypeError, "rolling_resistance is str"),
+    (lambda w: tandem.World([BOX], substeps=0), ValueError, "substeps is 0"),
+    (lambda w: tandem.World([BOX], sleeping=1), TypeError, "sleeping is int"),
+    (lambda w: tandem.World([BOX], continuous=None), TypeError, "continuous is NoneType"),
+    (lambda w: tandem.World([BOX], threads=1025), ValueError, "threads is 1025"),
+    (lambda w: w.place(asset=[0, 1]), tandem.Error, "instance 1: .*asset"),
+    (lambda w: w.place(rotation=2 * np.eye(3)), tandem.Error, "instance 0: .*scales by 2"),
+    (lambda w: w.place(translation=np.zeros((2, 3)), density=[1, 0]), tandem.Error, "instance 1: .*density"),
+    (lambda w: w.place(translation=np.zeros((2, 3)), density=[1, 1, 1]), ValueError, "density has 3 rows where there are 2 bodies"),
+    (lambda w: w.place(translation=np.zeros(3), velocity=[0, 0, np.inf]), tandem.Error, "instance 0: .*not finite"),
+    (lambda w: w.place(translation=np.zeros(3), velocity=[0, 0]), ValueError, "velocity has shape"),
+    (lambda w: w.place(translation=np.zeros(3), filter=FIRST_FIXED), tandem.Error, "filter"),
+    (lambda w: w.place(translation=np.zeros(3), filter=tandem.Filter(excluded=[[0, 5]])), tandem.Error, "pair 0"),
+    (lambda w: w.place(translation=np.zeros(3), filter="fixed"), TypeError, "filter is str"),
+    (lambda w: tandem.World([BOX, tandem.build(*solids.box(1, 1, 1), topology=False)], asset=[0, 1]), tandem.Error, "asset 1"),
+    (lambda w: w.step(0), ValueError, "dt is 0"),
+    (lambda w: w.step(np.nan), ValueError, "dt is nan"),
+    (lambda w: w.step("1"), TypeError, "dt is str"),
+    (lambda w: w.step(1 / 60, -1), ValueError, "steps is -1"),
+    (lambda w: w.step(1 / 60, 1.5), TypeError, "steps is float"),
+    (lambda w: w.push(2, np.zeros(3)), ValueError, "body is 2 where 0 to 1"),
+    (lambda w: w.push(1, [1, 2]), ValueError, "impulse has shape"),
+    (lambda w: w.push(1, [0, 0, np.nan]), tandem.Error, "not finite"),
+    (lambda w: w.push(1, np.zeros(3), at=[np.inf, 0, 0]), tandem.Error, "not finite"),
+    (lambda w: w.move(-1, velocity=np.zeros(3)), ValueError, "body is -1"),
+    (lambda w: w.move(1, velocity=[np.nan, 0, 0]), tandem.Error, "instance 1"),
+    (lambda w: w.move(1, rotation=3 * np.eye(3)), tandem.Error, "instance 1: .*scales by 3"),
+    (lambda w: w.move(1, translation=np.zeros((2, 3))), ValueError, "2 poses where one"),
+    (lambda w: tandem.World([BOX]).move(0), ValueError, "there are no bodies"),
+    (lambda w: w.restore(None), TypeError, "state is NoneType"),
+])
+def test_wrong_calls_say_what_is_wrong(call, error, words):
+    with pytest.raises(error, match=words):
+        call(pair())
+
+
+def test_a_body_that_leaves_the_world_is_named():
+    world = tandem.World([BOX], translation=np.zeros((2, 3)) + [[0], [5]], velocity=[[0, 0, 0], [1e300, 0, 0]], gravity=[0, 0, 0])
+    with pytest.raises(tandem.Error, match="instance 1") as caught:
+        world.step(1000.0, 10)
+    assert caught.value.name == "OutOfRange" and np.isfinite(world.translation).all() and (world.translation[0] == 0).all()
+
+
+def test_a_second_thread_is_refused_and_others_run():
+    world, refused, done = pile(60), [], threading.Event()
+
+    def work():
+        world.step(1 / 240, 200)
+        done.set()
+
+    worker = threading.Thread(target=work)
+    worker.start()
+    while not done.is_set():
+        try:
+            world.translation
+        except RuntimeError as error:
+            refused.append(str(error))
+    worker.join()
+    assert set(refused) == {"another thread is in a call of this world"}
+
+
+def test_ctrl_c_ends_many_steps():
+    world = pair(sleeping=False)
+    signal.signal(signal.SIGALRM, signal.default_int_handler)
+    signal.setitimer(signal.ITIMER_REAL, 0.2)
+    start = time.monotonic()
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            world.step(1 / 60, 2**40)
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, signal.SIG_DFL)
+    assert time.monotonic() - start < 5 and world.time > 0 and world.translation[1, 2] == pytest.approx(1, abs=1e-3)
+    world.step(1 / 60)

@@ -7,12 +7,15 @@ import h5py
 import numpy as np
 
 from common import tools
+from stability_shapes import SHAPES, obj_of
 
 BVHBENCH, BVHBUILD, BVHINFO, MAKEASSETS = (tools.tool(name) for name in ("bvhbench", "bvhbuild", "bvhinfo", "makeassets"))
 SLOP = 5e-4  # metres, in every run of a scene
 GRAVITY = 9.81
-# Boxes by their lengths; all other meshes are files of assets/.
-BOXES = {"slab": (300, 40, 2), "flat": (1, 1, 0.2), "uneven": (1, 0.6, 0.2), "thin": (1, 1, 0.01), "target": (2, 2, 0.01)}
+# Boxes by their lengths; all other meshes are SHAPES and files of assets/.
+BOXES = {"slab": (300, 40, 2), "flat": (1, 1, 0.2), "uneven": (1, 0.6, 0.2), "thin": (1, 1, 0.01), "target": (2, 2, 0.01),
+         "rod": (0.04, 0.04, 1), "plate": (0.5, 0.5, 0.02)}
+KINEMATIC = 2  # what `fixed` is of a body that keeps its velocity
 ROCK = 80_000  # triangles of the rough rock, which makeassets makes
 NUDGE = 1e-6  # metres
 LEVELS = "0.1%,0.3%,1%,3%"  # errors of its coarser levels, of its diagonal
@@ -105,7 +108,7 @@ class Run:
             self.options = json.loads(file.attrs["options"])
             self.bodies = len(file["bodies/asset"])
             self.moving = file["bodies/motion"][:] == 0
-            self.mass = file["bodies/mass"][:][self.moving]
+            self.mass, self.inertia, self.centre = (file[f"bodies/{name}"][:][self.moving] for name in ("mass", "inertia", "centre_of_mass"))
             self.frames = {}
             file["frames"].visititems(lambda name, item: self.frames.update({name: item[:]}) if isinstance(item, h5py.Dataset) else None)
             # [state kept, moving body, ...]
@@ -152,6 +155,9 @@ class Workshop:
         if name in BOXES:
             source = self.folder / f"{name}.obj"
             source.write_text(box_obj(BOXES[name]))
+        if name in SHAPES:
+            source = self.folder / f"{name}.obj"
+            source.write_text(obj_of(*SHAPES[name]()))
         if name == "rock":
             source = self.folder / "rock.ply"
             tools.run(MAKEASSETS, "rock", "--triangles", ROCK, "-o", source)

@@ -41,7 +41,7 @@ void ContactsAhead::add_to(std::vector<ContactPoint>& found, std::span<const Obj
   filter_.motion = motion_.data();
   require(scene_.place(instances_, filter_), scene_);
   follow(bodies, states);
-  find_pairs(found, kept, bodies, states, dt, kFall * norm(gravity) * dt * dt);
+  find_pairs(found, kept, bodies, states, dt, kFall * norm(gravity) * dt * dt + overlap);
   find_approaches(bodies, states, dt, gravity, overlap);
   if (approaches_.empty()) return;
   find_points(bodies, states);
@@ -75,16 +75,16 @@ Vector3 ContactsAhead::approach_of(const ObjectPair& pair, std::span<const BodyS
 // surfaces: pairs_. now_apart_: all pairs that are near each other.
 void ContactsAhead::find_pairs(std::span<const ContactPoint> found, std::span<const ObjectPair> kept,
                                std::span<const BodyProperties> bodies, std::span<const BodyState> states,
-                               double dt, double fall) {
+                               double dt, double margin) {
   farthest_ = 0;
   for (std::uint32_t i = 0; i < bodies.size(); ++i) {
     if (is_still(i)) continue;
-    const double way = dt * (norm(states[i].velocity) + turns(bodies[i], states[i], i)) + fall;
+    const double way = dt * (norm(states[i].velocity) + turns(bodies[i], states[i], i)) + margin;
     farthest_ = std::max(farthest_, std::min(way, kFarthest * bodies[i].radius));
   }
   farthest_ *= 2;
   require(scene_.find_pairs(farthest_), scene_);
-  pairs_.clear(), now_apart_.clear(), former_.clear();
+  pairs_.clear(), now_apart_.clear();
   auto contact = found.begin();
   auto before = apart_.begin();
   for (const ObjectPair& pair : scene_.pairs()) {
@@ -97,11 +97,10 @@ void ContactsAhead::find_pairs(std::span<const ContactPoint> found, std::span<co
     now.distance -= (way_[pair.a] + way_[pair.b]) * (1 + 1e-9);
     const double turning =
         turns(bodies[pair.a], states[pair.a], pair.a) + turns(bodies[pair.b], states[pair.b], pair.b);
-    const double way = dt * (norm(approach_of(pair, states)) + turning) + fall;
+    const double way = dt * (norm(approach_of(pair, states)) + turning) + margin;
     const double most = kFarthest * std::min(bodies[pair.a].radius, bodies[pair.b].radius);
     if (now.distance > std::min(way, most)) continue;
     pairs_.push_back(pair);
-    if (now.triangle_a != kNoIndex) former_.push_back({pair.a, pair.b, now.triangle_a, now.triangle_b});
   }
   apart_.swap(now_apart_);
 }
@@ -112,15 +111,14 @@ void ContactsAhead::find_approaches(std::span<const BodyProperties> bodies, std:
   approaches_.clear();
   if (pairs_.empty()) return;
   // Farther than is needed now, so that most need not be asked about in the next steps.
-  const DistanceOptions options = {
-      .tolerance = {kExact * overlap, 0.05}, .reach = 2 * farthest_, .former = former_};
+  const DistanceOptions options = {.tolerance = {kExact * overlap, 0.05}, .reach = 2 * farthest_};
   require(distances_.find(scene_, pairs_, options), scene_);
   auto apart = apart_.begin();
   for (std::size_t i = 0; i < pairs_.size(); ++i) {
     const ObjectPair& pair = pairs_[i];
     const ObjectDistance& distance = distances_.rows()[i];
     while (apart->pair < pair) ++apart;
-    *apart = {pair, distance.lower, distance.triangle_a, distance.triangle_b};
+    apart->distance = distance.lower;
     if (distance.triangle_a == kNoIndex) continue;
     const Vector3 from_b = vector_of(distance.point_a) - vector_of(distance.point_b);
     const double gap = norm(from_b);

@@ -27,11 +27,10 @@ class ContactsAhead {
               std::span<const std::uint8_t> idle, double dt, const Vector3& gravity, double overlap);
 
  private:
-  /// A pair, how far apart its bodies are at least, and the triangles that were nearest.
+  /// A pair, and how far apart its bodies are at least.
   struct Apart {
     ObjectPair pair;
     double distance = 0;
-    std::uint32_t triangle_a = kNoIndex, triangle_b = kNoIndex;
   };
   struct Approach {
     ObjectPair pair;
@@ -43,7 +42,7 @@ class ContactsAhead {
   Vector3 approach_of(const ObjectPair& pair, std::span<const BodyState> states) const;
   void find_pairs(std::span<const ContactPoint> found, std::span<const ObjectPair> kept,
                   std::span<const BodyProperties> bodies, std::span<const BodyState> states, double dt,
-                  double fall);
+                  double margin);
   void find_approaches(std::span<const BodyProperties> bodies, std::span<const BodyState> states, double dt,
                        const Vector3& gravity, double overlap);
   void find_points(std::span<const BodyProperties> bodies, std::span<const BodyState> states);
@@ -61,7 +60,6 @@ class ContactsAhead {
   std::vector<Motion> motion_;
   std::vector<Instance> instances_;
   std::vector<ObjectPair> pairs_, moved_pairs_;
-  std::vector<FormerNearest> former_;
   std::vector<Approach> approaches_;
   std::vector<ContactPoint> points_;
 };

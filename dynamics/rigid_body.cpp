@@ -47,6 +47,7 @@ BodyProperties body_properties(std::uint32_t shape, const MassProperties& mesh, 
   BodyProperties body;
   body.shape = shape;
   body.mass = density * mesh.volume;
+  body.density = density;
   body.centre = mesh.centre;
   body.inertia = density * mesh.inertia_per_density;
   body.inverse_inertia = inverse(body.inertia);

@@ -11,6 +11,7 @@ struct BodyProperties {
   std::uint32_t shape = 0;                ///< by place in the list of assets
   Motion motion = Motion::moving;         ///< never sleeping; a kinematic one keeps its velocities
   double mass = 1;                        ///< kg; that of a fixed body is not looked at
+  double density = 0;                     ///< kg/m^3, of which the mass is; 0 of a fixed body
   double radius = 1;                      ///< of the shape, about the centre of mass
   Vector3 centre;                         ///< of mass, in the file's coordinates
   Matrix3 inertia = Matrix3::identity();  ///< about the centre, along the file's axes

@@ -100,6 +100,7 @@ class Masses {
     body = *of_[from.asset];
     body.motion = motion;
     body.mass *= from.density;
+    body.density = from.density;
     body.inertia = from.density * body.inertia;
     body.inverse_inertia = (1 / from.density) * body.inverse_inertia;
     return Status::kOk;

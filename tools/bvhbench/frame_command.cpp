@@ -1,5 +1,6 @@
 #include <cstdio>
 
+#include "bvhbench/scenes/hdf5_file.h"
 #include "bvhbench/simulator/run_file.h"
 #include "command.h"
 #include "common/number_words.h"
@@ -20,7 +21,11 @@ ExitCode run_frame(const FrameArguments& arguments) {
     scene.assets.push_back(seen_from(arguments.output, beside(arguments.run, asset)));
   scene.instances = frame.poses;
   scene.level = frame.level;
-  write_scene(arguments.output, scene);
+  scene.filter.motion = frame.motion;
+  Hdf5Output file(arguments.output);
+  add_scene(file, scene);
+  add_motion(file, frame.moving);
+  file.write();
   std::printf("%s: %s instances after step %u of %s\n", arguments.output.c_str(),
               with_commas(scene.instances.size()).c_str(), arguments.frame, arguments.run.c_str());
   return kDone;
@@ -30,7 +35,8 @@ ExitCode run_frame(const FrameArguments& arguments) {
 
 void add_frame(Command tool, Run& run_later) {
   const auto [command, arguments] = add_command<FrameArguments>(
-      tool, run_later, "frame", "save a kept state of a simulation as a scene file", run_frame);
+      tool, run_later, "frame", "save a kept state of a simulation, with its motion, as a scene file",
+      run_frame);
   command.add({required({"RUN", arguments.run, "", "file of a simulation with a trajectory", file_name()}),
                required({"--frame", arguments.frame, "K", "steps made before the state; 0: the start"}),
                required(output_option(arguments, "the scene file to write; appears whole or not at all",

@@ -197,7 +197,21 @@ bool is_done(const SimulateArguments& arguments, const RunDescription& run) {
   return read_run(arguments.run.output, run).records.size() == arguments.run.steps;
 }
 
+// Refuses options that the chosen solver would not look at.
+void check_solver_options(const SimulateArguments& arguments) {
+  const TestBedSolverOptions none, &given = arguments.simulator.solver;
+  if (given.method == SolverMethod::sweeps) return;
+  const auto refuse = [](bool is_given, const char* option) {
+    if (is_given) throw UsageError(std::string(option) + " is of --solver sweeps");
+  };
+  refuse(given.iterations != none.iterations, "--iterations");
+  refuse(given.position_iterations != none.position_iterations, "--position-iterations");
+  refuse(given.order != none.order, "--order");
+  refuse(given.shock_propagation, "--shock");
+}
+
 ExitCode run(const char* kind, SimulateArguments arguments, const SetUp& set_up) {
+  check_solver_options(arguments);
   check_output(arguments, {arguments.mesh, arguments.ground, arguments.scene});
   arguments.run.output = arguments.output;
   Start start;
@@ -245,13 +259,29 @@ std::string engine_defect(const std::string& name) {
   return unknown.empty() && !is_built_in(name) ? "this bvhbench was built without " + name : unknown;
 }
 
+// Seconds, also as a fraction such as 1/60.
+std::optional<double> seconds_in(const std::string& text) {
+  const std::size_t slash = text.find('/');
+  if (slash == std::string::npos) return number_in(text);
+  const auto part = number_in(text.substr(0, slash)), whole = number_in(text.substr(slash + 1));
+  return part && whole && *whole != 0 ? std::optional(*part / *whole) : std::nullopt;
+}
+
+// A longer step has no meaning: bodies fall by metres in it.
+std::string step_defect(const std::string& text) {
+  constexpr double kLongest = 1;
+  const double seconds = seconds_in(text).value_or(0);
+  return seconds >= 1e-9 && seconds <= kLongest ? "" : "not a number or fraction from 1e-09 to 1";
+}
+
 void add_solver_options(Command command, SimulateArguments& arguments) {
   SimulatorOptions& simulator = arguments.simulator;
   TestBedSolverOptions& solver = simulator.solver;
   command.add(
       {{"--solver", solver.method, kSolvers, "auto|soft|newton|sweeps [auto]",
         "how a step is solved: 'soft' or 'newton', 'auto' of these two, or 'sweeps'"},
-       {"--dt", simulator.dt, "SECONDS [1/60]", "seconds of a step", between(1e-9, 1e3)},
+       {"--dt", [&simulator](const std::string& text) { simulator.dt = *seconds_in(text); }, "SECONDS [1/60]",
+        "seconds of a step, as a number or a fraction", step_defect},
        {"--substeps", solver.substeps, "N [16, with sweeps 1]", "parts of a step that share its contacts",
         between(1, 10'000)},
        {"--iterations", solver.iterations, "N [30]", "sweeps for velocities in each part of a step",

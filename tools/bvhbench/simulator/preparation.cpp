@@ -93,6 +93,7 @@ class Shapes {
     BodyProperties body = *of_dynamic_[shape];
     body.motion = motion;
     body.mass *= density;
+    body.density = density;
     body.inertia = density * body.inertia;
     body.inverse_inertia = (1 / density) * body.inverse_inertia;
     return body;

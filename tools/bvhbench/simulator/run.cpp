@@ -150,6 +150,10 @@ StepRecord make_step(Simulator& simulator, const std::string& output, std::uint3
     return record;
   } catch (const EngineError& error) {
     throw bench::FileError(output + ": step " + std::to_string(step) + ": " + error.what());
+  } catch (const QueryFailed& failed) {
+    const std::string body =
+        subject(failed.status) != nullptr ? "body " + std::to_string(failed.where) + ": " : "";
+    throw bench::FileError(output + ": step " + std::to_string(step) + ": " + body + explain(failed.status));
   }
 }
 

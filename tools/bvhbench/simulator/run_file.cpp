@@ -186,6 +186,7 @@ void write_bodies(Hdf5Output& file, const RunDescription& run) {
   if (std::any_of(bodies.begin(), bodies.end(), level)) add_column(file, "/bodies/level", bodies, level);
   add_column(file, "/bodies/motion", bodies, motion);
   add_column(file, "/bodies/mass", bodies, mass);
+  add_column(file, "/bodies/density", bodies, &BodyProperties::density);
   add_column(file, "/bodies/centre_of_mass", bodies, &BodyProperties::centre);
   std::vector<double> inertia;
   for (const BodyProperties& body : bodies)
@@ -199,6 +200,8 @@ void write_trajectory(Hdf5Output& file, const Trajectory& trajectory, std::size_
   file.add("/trajectory/frame", {kept}, trajectory.frame);
   file.add("/trajectory/position", {kept, bodies, 3}, trajectory.position);
   file.add("/trajectory/orientation", {kept, bodies, 4}, trajectory.orientation);
+  file.add("/trajectory/velocity", {kept, bodies, 3}, trajectory.velocity);
+  file.add("/trajectory/angular_velocity", {kept, bodies, 3}, trajectory.angular_velocity);
 }
 
 Trajectory read_trajectory(const Hdf5Input& file, const std::string& path, std::size_t bodies) {
@@ -206,8 +209,11 @@ Trajectory read_trajectory(const Hdf5Input& file, const std::string& path, std::
   trajectory.frame = file.read_u32("/trajectory/frame");
   trajectory.position = file.read_f64("/trajectory/position", {bodies, 3});
   trajectory.orientation = file.read_f64("/trajectory/orientation", {bodies, 4});
+  trajectory.velocity = file.read_f64("/trajectory/velocity", {bodies, 3});
+  trajectory.angular_velocity = file.read_f64("/trajectory/angular_velocity", {bodies, 3});
   const std::size_t states = trajectory.frame.size() * bodies;
-  if (trajectory.position.size() != 3 * states || trajectory.orientation.size() != 4 * states) {
+  if (trajectory.position.size() != 3 * states || trajectory.orientation.size() != 4 * states ||
+      trajectory.velocity.size() != 3 * states || trajectory.angular_velocity.size() != 3 * states) {
     throw FileError(path + ": /trajectory: not of " + std::to_string(trajectory.frame.size()) + " frames");
   }
   return trajectory;
@@ -280,9 +286,12 @@ void check_options(const Hdf5Input& file, const std::string& path, const Json& e
 void Trajectory::keep(std::uint32_t step, std::span<const BodyState> states) {
   if (every == 0 || step % every != 0) return;
   frame.push_back(step);
-  for (const BodyState& state : states)
-    Stored<Vector3>::append(position, state.position),
-        Stored<Quaternion>::append(orientation, state.orientation);
+  for (const BodyState& state : states) {
+    Stored<Vector3>::append(position, state.position);
+    Stored<Quaternion>::append(orientation, state.orientation);
+    Stored<Vector3>::append(velocity, state.velocity);
+    Stored<Vector3>::append(angular_velocity, state.angular_velocity);
+  }
 }
 
 void write_run(const std::string& path, const RunDescription& run, const RunResults& results) {
@@ -340,6 +349,19 @@ StoredFrame read_frame(const std::string& path, std::uint32_t frame) {
     stored.level = file.read_u32("/bodies/level");
     if (stored.level.size() != shape.size()) throw FileError(path + ": /bodies/level: not of all bodies");
   }
+  for (const std::uint32_t motion : file.read_u32("/bodies/motion"))
+    stored.motion.push_back(static_cast<Motion>(motion & 3));
+  stored.moving.density = file.read_f64("/bodies/density");
+  if (stored.motion.size() != shape.size() || stored.moving.density.size() != shape.size())
+    throw FileError(path + ": /bodies/motion, /bodies/density: not of all bodies");
+  // A fixed body's density is not looked at, but must be one.
+  for (double& density : stored.moving.density) density = density > 0 ? density : 1000;
+  const auto of_frame = [&](const std::vector<double>& all) {
+    const auto first = all.begin() + (found - kept.begin()) * static_cast<std::ptrdiff_t>(3 * shape.size());
+    return std::vector<double>(first, first + static_cast<std::ptrdiff_t>(3 * shape.size()));
+  };
+  stored.moving.velocity = of_frame(trajectory.velocity);
+  stored.moving.angular_velocity = of_frame(trajectory.angular_velocity);
   for (std::size_t i = 0; i < shape.size(); ++i) {
     const std::size_t at = static_cast<std::size_t>(found - kept.begin()) * shape.size() + i;
     BodyProperties body;

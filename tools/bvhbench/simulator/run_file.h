@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "bvhbench/scenes/scene_file.h"
+#include "bvhbench/scenes/scene_motion.h"
 #include "common/json.h"
 #include "simulator.h"
 
@@ -11,10 +12,11 @@ namespace tandem::simulation {
 
 /// States of a run that are kept: those after 0, every, 2 * every, ... steps.
 struct Trajectory {
-  std::uint32_t every = 0;           ///< 0: none is kept
-  std::vector<std::uint32_t> frame;  ///< steps made before each state
-  std::vector<double> position;      ///< of the centres of mass, bodies x 3 for each state
-  std::vector<double> orientation;   ///< quaternions w x y z, bodies x 4 for each state
+  std::uint32_t every = 0;                         ///< 0: none is kept
+  std::vector<std::uint32_t> frame;                ///< steps made before each state
+  std::vector<double> position;                    ///< of the centres of mass, bodies x 3 for each state
+  std::vector<double> orientation;                 ///< quaternions w x y z, bodies x 4 for each state
+  std::vector<double> velocity, angular_velocity;  ///< as position
 
   void keep(std::uint32_t step, std::span<const BodyState> states);
 };
@@ -42,12 +44,14 @@ void write_run(const std::string& path, const RunDescription& run, const RunResu
 /// with other bodies or options; it names the option.
 RunResults read_run(const std::string& path, const RunDescription& expected);
 
-/// A body's asset and pose in a kept state, as the engine saw them.
+/// A kept state: assets and poses of bodies, as the engine saw them, what moves them, and how they move.
 /// Throws bench::FileError: of the file, or where it keeps no such state; it names those that it keeps.
 struct StoredFrame {
   std::vector<std::string> assets;   ///< relative to the run file
   std::vector<BodyPose> poses;       ///< of these assets
   std::vector<std::uint32_t> level;  ///< of detail, of each body; none: level 0 of all
+  std::vector<Motion> motion;
+  bench::SceneMotion moving;
 };
 StoredFrame read_frame(const std::string& path, std::uint32_t frame);
 

@@ -138,7 +138,7 @@ TEST(World, ARodThatSpinsFastKeepsItsEnergy) {
 
 TEST(World, AHeapComesToRestAndSleeps) {
   WorldOnGround scene(box(1, 0.4f, 0.25f));
-  RandomPoses random(1);
+  RandomPoses random(3);
   for (int i = 0; i < 40; ++i) {
     const Pose turned = any_motion(random, 0);
     scene.add(after(shift(0.4 * (i % 3) - 0.4, 0.4 * (i / 3 % 3) - 0.4, 1 + 0.5 * i / 9), turned));

@@ -170,13 +170,17 @@ void ContinuousMotion::limit(std::span<const BodyProperties> bodies, std::span<c
   }
   for (std::size_t i = 0; i < bodies.size(); ++i) {
     if (part_[i] == 1) continue;
+    const Quaternion end = after[i].orientation;
     after[i].position = before[i].position + part_[i] * way_[i];
     after[i].orientation = turned(before[i].orientation, part_[i] * turn_[i]);
     const auto at_impact = [&](const Vector3& from, const Vector3& to) {
       return held_[i] * (from + part_[i] * (to - from));
     };
+    // Spins are those in the body's frame, or a rod that turns about its axis would turn about another one.
+    const Vector3 spin = at_impact(rotated(conjugated(before[i].orientation), before[i].angular_velocity),
+                                   rotated(conjugated(end), after[i].angular_velocity));
     after[i].velocity = at_impact(before[i].velocity, after[i].velocity);
-    after[i].angular_velocity = at_impact(before[i].angular_velocity, after[i].angular_velocity);
+    after[i].angular_velocity = rotated(after[i].orientation, spin);
   }
 }
 

@@ -31,6 +31,8 @@ void rotate(const BodyProperties& body, BodyState& state, const Vector3& correct
   }
   constexpr double kTurn = 0.05;  // in a part: its error is about a thirtieth of the square, of the turn
   constexpr double kMostParts = 1000;
+  constexpr double kGain = 0.05;  // of free rotation by rounding and parts, at most
+  const BodyState before = state;
   const Vector3 momentum = turn_into_world(state.orientation, body.inertia, state.angular_velocity);
   const double turn = dt * norm(state.angular_velocity);
   const double parts = turn < kTurn * kMostParts ? std::max(1.0, std::ceil(turn / kTurn)) : kMostParts;
@@ -38,6 +40,11 @@ void rotate(const BodyProperties& body, BodyState& state, const Vector3& correct
     const Vector3 middle = midpoint_angular_velocity(body, state, momentum, dt / parts);
     state.orientation = normalized(rotation_by((dt / parts) * (middle + correction)) * state.orientation);
     state.angular_velocity = turn_into_world(state.orientation, body.inverse_inertia, momentum);
+  }
+  // A correction that tilts a slender body under its spin would give it energy: the spin tilts with it.
+  if (dot(momentum, state.angular_velocity) > (1 + kGain) * dot(momentum, before.angular_velocity)) {
+    const Vector3 in_body = rotated(conjugated(before.orientation), before.angular_velocity);
+    state.angular_velocity = rotated(state.orientation, in_body);
   }
 }
 

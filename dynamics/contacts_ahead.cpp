@@ -33,10 +33,11 @@ void ContactsAhead::add_to(std::vector<ContactPoint>& found, std::span<const Obj
                            std::span<const std::uint8_t> idle, double dt, const Vector3& gravity,
                            double overlap) {
   motion_.assign(bodies.size(), Motion::moving);
-  instances_.resize(bodies.size());
+  instances_.resize(bodies.size()), turning_.resize(bodies.size());
   for (std::size_t i = 0; i < bodies.size(); ++i) {
     instances_[i] = pose_of(bodies[i], states[i]);
     if (!idle.empty() && idle[i] != 0) motion_[i] = Motion::fixed;
+    turning_[i] = motion_[i] == Motion::fixed ? 0 : bodies[i].radius * norm(states[i].angular_velocity);
   }
   filter_.motion = motion_.data();
   require(scene_.place(instances_, filter_), scene_);
@@ -61,10 +62,6 @@ void ContactsAhead::follow(std::span<const BodyProperties> bodies, std::span<con
   }
 }
 
-double ContactsAhead::turns(const BodyProperties& body, const BodyState& state, std::uint32_t i) const {
-  return is_still(i) ? 0 : body.radius * norm(state.angular_velocity);
-}
-
 // The velocity of b's centre as seen from a's.
 Vector3 ContactsAhead::approach_of(const ObjectPair& pair, std::span<const BodyState> states) const {
   return (is_still(pair.b) ? Vector3{} : states[pair.b].velocity) -
@@ -79,7 +76,7 @@ void ContactsAhead::find_pairs(std::span<const ContactPoint> found, std::span<co
   farthest_ = 0;
   for (std::uint32_t i = 0; i < bodies.size(); ++i) {
     if (is_still(i)) continue;
-    const double way = dt * (norm(states[i].velocity) + turns(bodies[i], states[i], i)) + margin;
+    const double way = dt * (norm(states[i].velocity) + turning_[i]) + margin;
     farthest_ = std::max(farthest_, std::min(way, kFarthest * bodies[i].radius));
   }
   farthest_ *= 2;
@@ -95,9 +92,7 @@ void ContactsAhead::find_pairs(std::span<const ContactPoint> found, std::span<co
     Apart& now = now_apart_.emplace_back(Apart{pair});
     if (before != apart_.end() && before->pair == pair) now = *before;
     now.distance -= (way_[pair.a] + way_[pair.b]) * (1 + 1e-9);
-    const double turning =
-        turns(bodies[pair.a], states[pair.a], pair.a) + turns(bodies[pair.b], states[pair.b], pair.b);
-    const double way = dt * (norm(approach_of(pair, states)) + turning) + margin;
+    const double way = dt * (norm(approach_of(pair, states)) + turning_of(pair)) + margin;
     const double most = kFarthest * std::min(bodies[pair.a].radius, bodies[pair.b].radius);
     if (now.distance > std::min(way, most)) continue;
     pairs_.push_back(pair);
@@ -123,9 +118,7 @@ void ContactsAhead::find_approaches(std::span<const BodyProperties> bodies, std:
     const Vector3 from_b = vector_of(distance.point_a) - vector_of(distance.point_b);
     const double gap = norm(from_b);
     if (!(gap > 0)) continue;
-    const double closing = dot(approach_of(pair, states), from_b) / gap +
-                           turns(bodies[pair.a], states[pair.a], pair.a) +
-                           turns(bodies[pair.b], states[pair.b], pair.b);
+    const double closing = dot(approach_of(pair, states), from_b) / gap + turning_of(pair);
     const double falls = kFall * std::fabs(dot(gravity, from_b)) / gap * dt;
     const double most = kFarthest * std::min(bodies[pair.a].radius, bodies[pair.b].radius);
     if (gap <= std::min(most, dt * (std::max(0.0, closing) + falls) + overlap))

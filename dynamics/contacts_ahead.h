@@ -10,9 +10,9 @@ namespace tandem::dynamics {
 /// Finds contacts of bodies that do not touch yet but may within the step, with their gaps, so that the
 /// solver stops them where they meet, and not a step later and deep in each other.
 ///
-/// Of a pair that may come together, the nearest points say from where: b is moved this way until it overlaps
-/// a a little, the contact points are those of that pose, and their gaps what b was moved by along their
-/// normals. So two faces that will meet have the points of a patch, and not one.
+/// The nearest points of a pair say from where its bodies may come together: b is moved this way until it
+/// overlaps a a little, the contact points are those of that pose, and their gaps what b was moved by along
+/// their normals. So two faces that will meet have the points of a patch, and not one.
 class ContactsAhead {
  public:
   /// The data that the assets and the filter look at must outlive this. The filter's motions are not looked
@@ -38,7 +38,7 @@ class ContactsAhead {
   };
   void follow(std::span<const BodyProperties> bodies, std::span<const BodyState> states);
   bool is_still(std::uint32_t body) const { return motion_[body] == Motion::fixed; }
-  double turns(const BodyProperties& body, const BodyState& state, std::uint32_t i) const;
+  double turning_of(const ObjectPair& pair) const { return turning_[pair.a] + turning_[pair.b]; }
   Vector3 approach_of(const ObjectPair& pair, std::span<const BodyState> states) const;
   void find_pairs(std::span<const ContactPoint> found, std::span<const ObjectPair> kept,
                   std::span<const BodyProperties> bodies, std::span<const BodyState> states, double dt,
@@ -58,6 +58,7 @@ class ContactsAhead {
   std::vector<Apart> apart_, now_apart_;
   double farthest_ = 0;  // reach of all pairs
   std::vector<Motion> motion_;
+  std::vector<double> turning_;  // how fast points of each body move by its spin, at most
   std::vector<Instance> instances_;
   std::vector<ObjectPair> pairs_, moved_pairs_;
   std::vector<Approach> approaches_;

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tandem/kernels/world_box.h"
+
 namespace tandem::dynamics {
 namespace {
 
@@ -59,6 +61,21 @@ BodyProperties body_properties(std::uint32_t shape, const MassProperties& mesh, 
   body.inertia = density * mesh.inertia_per_density;
   body.inverse_inertia = inverse(body.inertia);
   return body;
+}
+
+BodyProperties of_density(BodyProperties body, double density) {
+  body.mass *= density;
+  body.density = density;
+  body.inertia = density * body.inertia;
+  body.inverse_inertia = (1 / density) * body.inverse_inertia;
+  return body;
+}
+
+bool is_usable(const BodyState& state) {
+  const Vector3& x = state.position;
+  const double most = std::max({std::fabs(x.x), std::fabs(x.y), std::fabs(x.z)});
+  return is_finite(x) && most <= kLargestWorldCoordinate && std::isfinite(state.orientation.w) &&
+         is_finite(state.velocity) && is_finite(state.angular_velocity);
 }
 
 Instance pose_of(const BodyProperties& body, const BodyState& state) {

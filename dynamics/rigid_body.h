@@ -36,6 +36,12 @@ inline Vector3 into_world(const BodyState& state, const Vector3& point) {
 /// Properties of a dynamic body of a mesh with this mass. radius is left as it is.
 BodyProperties body_properties(std::uint32_t shape, const MassProperties& mesh, double density);
 
+/// A body of density 1, made one of another density.
+BodyProperties of_density(BodyProperties body, double density);
+
+/// Returns whether a step can start from a state: all numbers are finite, and places such as queries take.
+bool is_usable(const BodyState& state);
+
 /// Returns where a question is to see the body: x_world = rotation * x_file + translation.
 Instance pose_of(const BodyProperties& body, const BodyState& state);
 

@@ -51,7 +51,7 @@ void write(const Vector3& x, double (&out)[3]) {
   out[0] = x.x, out[1] = x.y, out[2] = x.z;
 }
 
-// Of NaN too it is false.
+// It is false of NaN too.
 bool is_option(double x, double least, double most) {
   return x >= least && x <= most;
 }
@@ -63,14 +63,6 @@ Status check(const WorldOptions& options) {
               is_option(options.substeps, 1, 10'000) && is_option(options.threads, 1, kMostSceneThreads);
   for (const double g : options.gravity) good = good && is_option(g, -kMost, kMost);
   return good ? Status::kOk : Status::kBadOption;
-}
-
-// Returns whether a step can start from a state.
-bool is_usable(const BodyState& state) {
-  const Vector3& x = state.position;
-  const double most = std::max({std::fabs(x.x), std::fabs(x.y), std::fabs(x.z)});
-  return is_finite(x) && most <= kLargestWorldCoordinate && std::isfinite(state.orientation.w) &&
-         is_finite(state.velocity) && is_finite(state.angular_velocity);
 }
 
 // Masses of assets, found once.
@@ -97,12 +89,8 @@ class Masses {
       of_[from.asset]->radius = radius_about(of_[from.asset]->centre, asset);
     }
     const Motion motion = body.motion;
-    body = *of_[from.asset];
+    body = of_density(*of_[from.asset], from.density);
     body.motion = motion;
-    body.mass *= from.density;
-    body.density = from.density;
-    body.inertia = from.density * body.inertia;
-    body.inverse_inertia = (1 / from.density) * body.inverse_inertia;
     return Status::kOk;
   }
 

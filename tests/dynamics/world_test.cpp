@@ -136,7 +136,7 @@ TEST(World, ARodThatSpinsFastKeepsItsEnergy) {
   }
 }
 
-// Of heaps some keep a box that rocks on its edge.
+// Some heaps keep a box that rocks on its edge.
 TEST(World, MostHeapsComeToRestAndSleep) {
   int resting = 0;
   for (const std::uint64_t seed : {1, 2, 3, 4, 5, 6}) {

@@ -90,12 +90,8 @@ class Shapes {
       return *of_fixed_[shape];
     }
     if (!of_dynamic_[shape]) of_dynamic_[shape] = dynamic(shape, findings);
-    BodyProperties body = *of_dynamic_[shape];
+    BodyProperties body = of_density(*of_dynamic_[shape], density);
     body.motion = motion;
-    body.mass *= density;
-    body.density = density;
-    body.inertia = density * body.inertia;
-    body.inverse_inertia = (1 / density) * body.inverse_inertia;
     return body;
   }
 

@@ -127,13 +127,6 @@ class Checkpoints {
 
 // Refuses a state that no further step can start from, such as that of a body whose speed has overflowed.
 void check_states(const Simulator& simulator, const std::string& output, std::uint32_t step) {
-  const auto is_usable = [](const BodyState& state) {
-    const auto& [x, y, z] = state.position;
-    const double bound = kLargestWorldCoordinate;
-    return std::fabs(x) <= bound && std::fabs(y) <= bound && std::fabs(z) <= bound &&
-           std::isfinite(state.orientation.w) && is_finite(state.velocity) &&
-           is_finite(state.angular_velocity);
-  };
   const auto states = simulator.states();
   const auto lost = std::find_if_not(states.begin(), states.end(), is_usable);
   if (lost == states.end()) return;

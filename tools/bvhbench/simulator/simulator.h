@@ -26,7 +26,7 @@ enum class ContactOrder : std::uint8_t {
   shuffled,  ///< anew in each step, from the seed
 };
 
-/// Those of the library; rolling resistance is not of sweeps.
+/// The library's options and those of sweeps, which have no rolling resistance.
 struct TestBedSolverOptions : dynamics::SolverOptions {
   SolverMethod method = SolverMethod::automatic;
 

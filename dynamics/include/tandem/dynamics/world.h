@@ -18,7 +18,7 @@ struct BodyDescription {
   double angular_velocity[3] = {};
 };
 
-/// Where a body is, and how it moves.
+/// The place of a body, and how it moves.
 struct BodyMotion {
   Pose pose;           ///< of the file's coordinates
   double centre[3];    ///< of mass, in the world; of a fixed body the origin of its file's coordinates

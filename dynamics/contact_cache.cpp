@@ -119,7 +119,7 @@ std::vector<ObjectPair> ContactCache::pairs() const {
 
 void ContactCache::update(std::span<const ContactPoint> found, std::span<const ObjectPair> kept,
                           std::span<const BodyProperties> bodies, std::span<const BodyState> states,
-                          std::span<const std::uint8_t> idle, double gap) {
+                          std::span<const std::uint8_t> idle, std::span<const double> gaps) {
   const std::vector<CachedContact> before = std::move(entries_);
   is_cold_ = before.empty();
   entries_.clear(), contacts_.clear(), place_.clear();
@@ -138,7 +138,7 @@ void ContactCache::update(std::span<const ContactPoint> found, std::span<const O
     if (std::binary_search(kept.begin(), kept.end(), pair)) {
       for (const CachedContact& entry : old) add(entry, moved_with_bodies(entry, states));
     } else {
-      renew(old, fresh, states, gap, smaller_radius(pair, bodies));
+      renew(old, fresh, states, std::max(gaps[pair.a], gaps[pair.b]), smaller_radius(pair, bodies));
     }
   }
 }

@@ -29,7 +29,7 @@ class ContactCache {
 
   /// Makes the contacts of a step. Pairs that are kept have those remembered, moved with the bodies; these
   /// may have become gaps. All others have those found, and those just lost: remembered ones that are gaps of
-  /// at most `gap` along the normal, slid by at most a fiftieth of the smaller body's radius, with no other
+  /// at most the larger gap of their bodies along the normal, slid by at most a fiftieth of the smaller body's radius, with no other
   /// contact of the pair that near, for at most eight steps since they pushed. Without these a body that
   /// comes off by a hair falls freely for a whole step, and deeper than it was.
   ///
@@ -39,10 +39,11 @@ class ContactCache {
   /// none, so that a pair pushes as it did although its points have changed.
   ///
   /// Pairs of two idle bodies stay remembered and are left out. Conditions: found comes by ascending pair;
-  /// kept is ascending; idle is empty or has an entry for each body; gap >= 0.
+  /// kept is ascending; idle is empty or has an entry for each body; gaps
+  /// has one for each, >= 0.
   void update(std::span<const ContactPoint> found, std::span<const ObjectPair> kept,
               std::span<const BodyProperties> bodies, std::span<const BodyState> states,
-              std::span<const std::uint8_t> idle, double gap);
+              std::span<const std::uint8_t> idle, std::span<const double> gaps);
 
   /// Returns the contacts of the step that update() was last called for, by ascending pair.
   std::span<const ContactPoint> contacts() const { return contacts_; }

@@ -30,7 +30,7 @@ ContactsAhead::ContactsAhead(std::span<const AssetView> assets, std::uint32_t th
 
 void ContactsAhead::add_to(std::vector<ContactPoint>& found, std::span<const ObjectPair> kept,
                            std::span<const BodyProperties> bodies, std::span<const BodyState> states,
-                           std::span<const std::uint8_t> idle, double dt, const Vector3& gravity,
+                           std::span<const std::uint8_t> idle, double dt, std::span<const Pull> pulls,
                            double overlap) {
   motion_.assign(bodies.size(), Motion::moving);
   instances_.resize(bodies.size()), turning_.resize(bodies.size());
@@ -42,8 +42,8 @@ void ContactsAhead::add_to(std::vector<ContactPoint>& found, std::span<const Obj
   filter_.motion = motion_.data();
   require(scene_.place(instances_, filter_), scene_);
   follow(bodies, states);
-  find_pairs(found, kept, bodies, states, dt, kFall * norm(gravity) * dt * dt + overlap);
-  find_approaches(bodies, states, dt, gravity, overlap);
+  find_pairs(found, kept, bodies, states, dt, pulls, overlap);
+  find_approaches(bodies, states, dt, pulls, overlap);
   if (approaches_.empty()) return;
   find_points(bodies, states);
   const auto middle = static_cast<std::ptrdiff_t>(found.size());
@@ -72,11 +72,12 @@ Vector3 ContactsAhead::approach_of(const ObjectPair& pair, std::span<const BodyS
 // surfaces: pairs_. now_apart_: all pairs that are near each other.
 void ContactsAhead::find_pairs(std::span<const ContactPoint> found, std::span<const ObjectPair> kept,
                                std::span<const BodyProperties> bodies, std::span<const BodyState> states,
-                               double dt, double margin) {
+                               double dt, std::span<const Pull> pulls, double overlap) {
+  const auto margin_of = [&](std::uint32_t body) { return kFall * pulls[body].most() * dt * dt + overlap; };
   farthest_ = 0;
   for (std::uint32_t i = 0; i < bodies.size(); ++i) {
     if (is_still(i)) continue;
-    const double way = dt * (norm(states[i].velocity) + turning_[i]) + margin;
+    const double way = dt * (norm(states[i].velocity) + turning_[i]) + margin_of(i);
     farthest_ = std::max(farthest_, std::min(way, kFarthest * bodies[i].radius));
   }
   farthest_ *= 2;
@@ -92,7 +93,8 @@ void ContactsAhead::find_pairs(std::span<const ContactPoint> found, std::span<co
     Apart& now = now_apart_.emplace_back(Apart{pair});
     if (before != apart_.end() && before->pair == pair) now = *before;
     now.distance -= (way_[pair.a] + way_[pair.b]) * (1 + 1e-9);
-    const double way = dt * (norm(approach_of(pair, states)) + turning_of(pair)) + margin;
+    const double way = dt * (norm(approach_of(pair, states)) + turning_of(pair)) +
+                       std::max(margin_of(pair.a), margin_of(pair.b));
     const double most = kFarthest * std::min(bodies[pair.a].radius, bodies[pair.b].radius);
     if (now.distance > std::min(way, most)) continue;
     pairs_.push_back(pair);
@@ -101,7 +103,7 @@ void ContactsAhead::find_pairs(std::span<const ContactPoint> found, std::span<co
 }
 
 void ContactsAhead::find_approaches(std::span<const BodyProperties> bodies, std::span<const BodyState> states,
-                                    double dt, const Vector3& gravity, double overlap) {
+                                    double dt, std::span<const Pull> pulls, double overlap) {
   constexpr double kExact = 0.1;  // of the overlap
   approaches_.clear();
   if (pairs_.empty()) return;
@@ -119,7 +121,9 @@ void ContactsAhead::find_approaches(std::span<const BodyProperties> bodies, std:
     const double gap = norm(from_b);
     if (!(gap > 0)) continue;
     const double closing = dot(approach_of(pair, states), from_b) / gap + turning_of(pair);
-    const double falls = kFall * std::fabs(dot(gravity, from_b)) / gap * dt;
+    const Pull &on_a = pulls[pair.a], &on_b = pulls[pair.b];
+    const double pulled = std::max(std::fabs(dot(on_a.linear, from_b)), std::fabs(dot(on_b.linear, from_b)));
+    const double falls = (kFall * pulled / gap + kFall * (on_a.turning + on_b.turning)) * dt;
     const double most = kFarthest * std::min(bodies[pair.a].radius, bodies[pair.b].radius);
     if (gap <= std::min(most, dt * (std::max(0.0, closing) + falls) + overlap))
       approaches_.push_back({pair, ((gap + overlap) / gap) * from_b});

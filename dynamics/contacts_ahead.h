@@ -24,7 +24,7 @@ class ContactsAhead {
   /// told well. The result depends on nothing but the arguments. Throws QueryFailed.
   void add_to(std::vector<ContactPoint>& found, std::span<const ObjectPair> kept,
               std::span<const BodyProperties> bodies, std::span<const BodyState> states,
-              std::span<const std::uint8_t> idle, double dt, const Vector3& gravity, double overlap);
+              std::span<const std::uint8_t> idle, double dt, std::span<const Pull> pulls, double overlap);
 
  private:
   /// A pair, and how far apart its bodies are at least.
@@ -42,9 +42,9 @@ class ContactsAhead {
   Vector3 approach_of(const ObjectPair& pair, std::span<const BodyState> states) const;
   void find_pairs(std::span<const ContactPoint> found, std::span<const ObjectPair> kept,
                   std::span<const BodyProperties> bodies, std::span<const BodyState> states, double dt,
-                  double margin);
+                  std::span<const Pull> pulls, double overlap);
   void find_approaches(std::span<const BodyProperties> bodies, std::span<const BodyState> states, double dt,
-                       const Vector3& gravity, double overlap);
+                       std::span<const Pull> pulls, double overlap);
   void find_points(std::span<const BodyProperties> bodies, std::span<const BodyState> states);
 
   PairFilter filter_;

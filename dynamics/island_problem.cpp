@@ -53,7 +53,7 @@ class ProblemMaker {
     const MassScale scale = mass_scale(input_.bodies[body], state);
     problem_.scale.push_back(scale);
     problem_.velocity.push_back(scaled(scale, state.velocity, state.angular_velocity));
-    problem_.gravity.push_back(scaled(scale, input_.gravity, Vector3{}));
+    problem_.gravity.push_back(scaled(scale, input_.pulls[body].linear, input_.pulls[body].angular));
   }
 
   std::vector<std::uint32_t> from_the_ground_up(std::span<const std::uint32_t> contacts) const {
@@ -71,7 +71,7 @@ class ProblemMaker {
     for (auto* list :
          {&problem_.first_direction, &problem_.second_direction, &problem_.drive, &problem_.impulse})
       list->reserve(count);
-    for (auto* list : {&problem_.separation, &problem_.rebound}) list->reserve(count);
+    for (auto* list : {&problem_.separation, &problem_.friction, &problem_.rebound}) list->reserve(count);
     problem_.displacement.assign(problem_.bodies.size(), Vector6{});
   }
 
@@ -126,7 +126,7 @@ class ProblemMaker {
   }
 
   void add_contact(std::uint32_t index, const ContactImpulse& impulse) {
-    constexpr double kBouncesAbove = 2;  // times what gravity gives in a step
+    constexpr double kBouncesAbove = 2;  // times what gravity and forces give in a step
     const ContactPoint& contact = input_.contacts[index];
     const Vector3& normal = contact.normal;
     const Vector3 first = unit_orthogonal(normal), second = cross(normal, first);
@@ -148,8 +148,10 @@ class ProblemMaker {
     const double fall = -problem_.along(problem_.normal[i], i, problem_.gravity);
     const double square_at_impact = approach * approach + 2 * fall * gap;
     const bool meets = gap < input_.dt * (approach + 0.5 * input_.dt * fall) || gap == 0;
-    const bool bounces = meets && approach > kBouncesAbove * input_.dt * norm(input_.gravity);
-    problem_.rebound.push_back(bounces ? options_.restitution * std::sqrt(std::max(0.0, square_at_impact))
+    const bool bounces = meets && approach > kBouncesAbove * input_.dt * input_.pull_of(contact);
+    const Material material = material_of(contact);
+    problem_.friction.push_back(material.friction);
+    problem_.rebound.push_back(bounces ? material.restitution * std::sqrt(std::max(0.0, square_at_impact))
                                        : 0);
     problem_.impulse.push_back(
         {impulse.normal, dot(first, impulse.tangential), dot(second, impulse.tangential)});
@@ -174,6 +176,7 @@ class ProblemMaker {
     TouchingPair pair = {};
     pair.begin = begin, pair.end = end;
     pair.drive = spin_driven(contact.body_b) - spin_driven(contact.body_a);
+    pair.rolling_resistance = material_of(contact).rolling_resistance;
     pair.impulse = Vector3{};
     Matrix3 mobility;
     for (const std::uint32_t body : {problem_.a[begin], problem_.b[begin]}) {
@@ -189,6 +192,10 @@ class ProblemMaker {
       if (problem_.b[begin] > 0) pair.turn[k].b.angular = problem_.scale[problem_.b[begin]].spread.row[k];
     }
     problem_.pairs.push_back(pair);
+  }
+
+  Material material_of(const ContactPoint& contact) const {
+    return mixed_material(input_.bodies[contact.body_a], input_.bodies[contact.body_b], options_);
   }
 
   Vector3 spin_driven(std::uint32_t body) const {
@@ -213,13 +220,12 @@ IslandProblem make_island_problem(const StepInput& input, std::size_t island, co
   return ProblemMaker(input, start.states, options, layers, place).make(island, start.impulses);
 }
 
-Residual residual_of(const IslandProblem& problem, std::span<const double> target, double friction,
-                     double share) {
+Residual residual_of(const IslandProblem& problem, std::span<const double> target, double share) {
   Residual all;
   for (std::size_t i = 0; i < problem.contact_count(); ++i) {
     const ContactRow* rows[] = {&problem.normal[i], &problem.first[i], &problem.second[i]};
     const Vector3 impulse = share * problem.impulse[i];
-    const double bound = friction * impulse.x;
+    const double bound = problem.friction[i] * impulse.x;
     for (int k = 0; k < 3; ++k) {
       const double mobility = rows[k]->mobility();
       const double w = problem.along(*rows[k], i, problem.velocity) + at(problem.drive[i], k);

@@ -33,6 +33,7 @@ struct TouchingPair {
   std::array<ContactRow, 3> turn;  ///< about the axes of the world
   Vector3 drive;                   ///< of turn
   double mobility;                 ///< an impulse of 1 about any axis changes turn by no more
+  double rolling_resistance;       ///< the lever of the force that pushes them apart
   Vector3 impulse;                 ///< against turning, as a whole step would need it
 
   /// Return what the impulse adds to the y of its bodies.
@@ -51,13 +52,14 @@ struct IslandProblem {
   std::vector<MassScale> scale;
   std::vector<Vector6> velocity;      ///< y: at the start of the step, then at its end
   std::vector<Vector6> displacement;  ///< the integral of y over the step, a result
-  std::vector<Vector6> gravity;       ///< what it adds to y in a second
+  std::vector<Vector6> gravity;       ///< what it and lasting forces add to y in a second
 
   std::vector<std::uint32_t> contacts, a, b;
   std::vector<ContactRow> normal, first, second;  ///< the latter two across the normal
   std::vector<Vector3> first_direction, second_direction;
   std::vector<Vector3> drive;      ///< of normal, first, second: by bodies that move and are not moved
   std::vector<double> separation;  ///< of a gap; else the slop less the depth, at most 0
+  std::vector<double> friction;    ///< Coulomb's coefficient
   std::vector<double> rebound;     ///< velocity along the normal that restitution asks for, or 0
   std::vector<Vector3> impulse;    ///< along normal, first, second, as a whole step would need it
 
@@ -87,8 +89,7 @@ struct IslandProblem {
 
 /// target: of the velocities along the normals. share: part of the problem's impulses that the law is asked
 /// of.
-Residual residual_of(const IslandProblem& problem, std::span<const double> target, double friction,
-                     double share);
+Residual residual_of(const IslandProblem& problem, std::span<const double> target, double share);
 
 /// The bodies at the start of a step, and the impulses that its contacts start with.
 struct StepStart {

@@ -26,6 +26,9 @@ TANDEM_HD inline Vector3& operator+=(Vector3& p, const Vector3& q) {
 TANDEM_HD inline Vector3& operator-=(Vector3& p, const Vector3& q) {
   return p = p - q;
 }
+TANDEM_HD inline bool operator==(const Vector3& p, const Vector3& q) {
+  return p.x == q.x && p.y == q.y && p.z == q.z;
+}
 TANDEM_HD inline Vector3 operator/(const Vector3& p, double s) {
   return {p.x / s, p.y / s, p.z / s};
 }

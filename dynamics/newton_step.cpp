@@ -445,7 +445,7 @@ class NewtonStep {
     problem.impulse = std::move(impulse_.contact);
     for (std::size_t i = 0; i < problem.pairs.size(); ++i) problem.pairs[i].impulse = impulse_.turning[i];
     for (std::size_t j = 1; j < mean_.size(); ++j) problem.displacement[j] = input_.dt * mean_[j];
-    return residual_of(problem, target_, options_.friction, 1);
+    return residual_of(problem, target_, 1);
   }
 
  private:
@@ -501,14 +501,14 @@ class NewtonStep {
   }
 
   double friction_bound(const IslandImpulses& impulses, std::size_t contact) const {
-    return options_.friction * impulses.contact[contact].x;
+    return problem_.friction[contact] * impulses.contact[contact].x;
   }
 
   double turning_bound(const IslandImpulses& impulses, std::size_t pair) const {
     double push = 0;
     for (std::uint32_t i = problem_.pairs[pair].begin; i < problem_.pairs[pair].end; ++i)
       push += impulses.contact[i].x;
-    return options_.rolling_resistance * push;
+    return problem_.pairs[pair].rolling_resistance * push;
   }
 
   double least_change() const {
@@ -518,7 +518,10 @@ class NewtonStep {
       const Vector3 w = contacts_.relative(i, problem_.velocity) + problem_.drive[i];
       approach = std::max(approach, norm(w));
     }
-    return kOfGravity * input_.dt * norm(input_.gravity) + kOfApproach * approach;
+    double pull = 0;
+    for (std::size_t j = 1; j < problem_.bodies.size(); ++j)
+      pull = std::max(pull, input_.pull_of(problem_.bodies[j]));
+    return kOfGravity * input_.dt * pull + kOfApproach * approach;
   }
 
   // Returns by how much another pass would change velocities of contacts.

@@ -102,6 +102,16 @@ Matrix3 world_inverse_inertia(const BodyProperties& body, const BodyState& state
   return rotation * body.inverse_inertia * transposed(rotation);
 }
 
+Pull pull_on(const BodyProperties& body, const BodyState& state, const Vector3& gravity,
+             const BodyForce& force) {
+  Pull pull = {body.gravity_scale * gravity, {}};
+  if (body.motion != Motion::moving || force == BodyForce{}) return pull;
+  pull.linear += force.force / body.mass;
+  pull.angular = world_inverse_inertia(body, state) * force.torque;
+  pull.turning = body.radius * norm(pull.angular);
+  return pull;
+}
+
 void advance(const BodyProperties& body, BodyState& state, const Vector3& correction,
              const Vector3& angular_correction, double dt) {
   if (body.motion == Motion::fixed) return;

@@ -2,6 +2,7 @@
 #include <cstdint>
 
 #include "dynamics/mass_properties.h"
+#include "tandem/dynamics/material.h"
 #include "tandem/kernels/scene.h"
 
 namespace tandem::dynamics {
@@ -16,6 +17,8 @@ struct BodyProperties {
   Vector3 centre;                         ///< of mass, in the file's coordinates
   Matrix3 inertia = Matrix3::identity();  ///< about the centre, along the file's axes
   Matrix3 inverse_inertia = Matrix3::identity();
+  Material material;
+  double gravity_scale = 1;  ///< the part of gravity that acts on it
 };
 
 /// The state of a body: where it is and how it moves, in the world.
@@ -24,6 +27,26 @@ struct BodyState {
   Quaternion orientation;
   Vector3 velocity, angular_velocity;
 };
+
+/// A force on a body that lasts, and a torque about its centre of mass. Both are of the world's directions.
+struct BodyForce {
+  Vector3 force, torque;
+
+  friend bool operator==(const BodyForce&, const BodyForce&) = default;
+};
+
+/// What gravity and forces add to a body's velocities in a second.
+struct Pull {
+  Vector3 linear, angular;
+  double turning = 0;  ///< to the velocity of any of its points by `angular`, at most
+
+  /// Returns what is added to the velocity of any point, at most.
+  double most() const { return norm(linear) + turning; }
+};
+
+/// force: of a moving body; others have none.
+Pull pull_on(const BodyProperties& body, const BodyState& state, const Vector3& gravity,
+             const BodyForce& force = {});
 
 /// A point of the world in the body's frame about its centre of mass, and back.
 inline Vector3 into_body(const BodyState& state, const Vector3& point) {

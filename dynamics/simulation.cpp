@@ -37,6 +37,7 @@ Simulation::Simulation(std::vector<BodyProperties> bodies, std::vector<BodyState
 StepRecord Simulation::step() {
   Stopwatch step, phase;
   StepRecord record;
+  find_pulls();
   find_contacts(record);
   phase.lap();
   solve(record);
@@ -48,6 +49,12 @@ StepRecord Simulation::step() {
   return record;
 }
 
+void Simulation::find_pulls() {
+  pulls_.resize(bodies_.size());
+  for (std::size_t i = 0; i < bodies_.size(); ++i)
+    pulls_[i] = pull_on(bodies_[i], states_[i], options_.gravity, forces_.empty() ? BodyForce{} : forces_[i]);
+}
+
 void Simulation::find_contacts(StepRecord& record) {
   constexpr double kFall = 2;  // times what gravity lets a body fall in a step
   const std::vector<std::uint8_t> idle = this->idle();
@@ -55,11 +62,12 @@ void Simulation::find_contacts(StepRecord& record) {
   found_ = parts_.contacts->find(poses(), idle, {remembered, options_.solver.slop});
   take(record, parts_.contacts->report());
   Stopwatch stopwatch;
-  const double gap = kFall * norm(options_.gravity) * options_.dt * options_.dt;
+  std::vector<double> gaps;
+  for (const Pull& pull : pulls_) gaps.push_back(kFall * pull.most() * options_.dt * options_.dt);
   if (parts_.ahead)
     parts_.ahead->add_to(found_, parts_.contacts->kept(), acting_, states_, idle, options_.dt,
-                         options_.gravity, 0.5 * options_.solver.slop);
-  cache_.update(found_, parts_.contacts->kept(), bodies_, states_, idle, gap);
+                         pulls_, 0.5 * options_.solver.slop);
+  cache_.update(found_, parts_.contacts->kept(), bodies_, states_, idle, gaps);
   record.generation += stopwatch.lap();
   record.contacts = cache_.contacts().size();
   for (const ContactPoint& contact : cache_.contacts()) {
@@ -76,10 +84,11 @@ void Simulation::solve(StepRecord& record) {
   if (options_.solver.warm_start) impulses = cache_.impulses();
   const std::vector<BodyState> before = parts_.continuous ? states_ : std::vector<BodyState>();
   parts_.solver->step(
-      {acting_, contacts, islands_, options_.dt, options_.gravity, step_, cache_.is_cold(), threads_},
+      {acting_, contacts, islands_, options_.dt, pulls_, step_, cache_.is_cold(), threads_},
       states_, impulses);
   if (parts_.continuous) parts_.continuous->limit(acting_, before, states_, options_.solver.slop);
   cache_.remember(impulses);
+  touches_.update(contacts, impulses, idle());
   record.residual_max = parts_.solver->statistics().residual;
   record.residual_rms = parts_.solver->statistics().residual_rms;
   record.islands = parts_.solver->statistics().islands;
@@ -119,7 +128,7 @@ void Simulation::take_measures(StepRecord& record) const {
     const BodyState& state = states_[i];
     const double speed = norm(state.velocity);
     record.kinetic_energy += kinetic_energy(bodies_[i], state);
-    record.potential_energy -= bodies_[i].mass * dot(options_.gravity, state.position);
+    record.potential_energy -= bodies_[i].gravity_scale * bodies_[i].mass * dot(options_.gravity, state.position);
     record.linear_momentum += bodies_[i].mass * state.velocity;
     record.angular_momentum += angular_momentum(bodies_[i], state);
     record.speed_max = std::max(record.speed_max, speed);
@@ -137,17 +146,28 @@ void Simulation::place(std::uint32_t body, const BodyState& state) {
   update_acting();
 }
 
+void Simulation::set_force(std::uint32_t body, const BodyForce& force) {
+  if (forces_.empty()) forces_.resize(bodies_.size());
+  if (forces_[body] == force) return;
+  forces_[body] = force;
+  sleep_.wake(body);
+  update_acting();
+}
+
 SimulationState Simulation::save() const {
   const auto entries = cache_.entries();
   const auto posed = parts_.contacts->posed();
   const auto quiet = sleep_.quiet();
   const auto groups = sleep_.groups();
+  const auto touching = touches_.touching();
   return {step_,
           states_,
           {entries.begin(), entries.end()},
           {posed.begin(), posed.end()},
           {quiet.begin(), quiet.end()},
-          {groups.begin(), groups.end()}};
+          {groups.begin(), groups.end()},
+          forces_,
+          {touching.begin(), touching.end()}};
 }
 
 void Simulation::restore(SimulationState state) {
@@ -156,6 +176,8 @@ void Simulation::restore(SimulationState state) {
   cache_.restore(std::move(state.contacts));
   parts_.contacts->resume(state.posed);
   sleep_.restore(std::move(state.quiet), std::move(state.groups));
+  forces_ = std::move(state.forces);
+  touches_.restore(std::move(state.touching));
   update_acting();
 }
 

@@ -9,6 +9,7 @@
 #include "dynamics/contacts_ahead.h"
 #include "dynamics/continuous_motion.h"
 #include "dynamics/step_solver.h"
+#include "dynamics/touches.h"
 
 namespace tandem::dynamics {
 
@@ -50,6 +51,8 @@ struct SimulationState {
   std::vector<PosedBodies> posed;     ///< of the contact finder
   std::vector<double> quiet;          ///< of Sleep
   std::vector<std::uint32_t> groups;  ///< of Sleep
+  std::vector<BodyForce> forces;      ///< empty: there are none
+  std::vector<ObjectPair> touching;   ///< of Touches
 };
 
 /// What a simulation is made of, beside its bodies.
@@ -81,11 +84,18 @@ class Simulation {
   /// Puts a body somewhere else, awake.
   void place(std::uint32_t body, const BodyState& state);
 
+  /// Sets what acts on a body from the next step on, beside gravity and contacts. Wakes it if that is another
+  /// force than before.
+  void set_force(std::uint32_t body, const BodyForce& force);
+
   /// Sets how long the next steps are, in seconds.
   void set_step(double dt) { options_.dt = dt; }
 
   /// The contacts of the last step, and their impulses.
   const ContactCache& contacts() const { return cache_; }
+
+  /// The pairs of bodies that touched in the last step.
+  const Touches& touches() const { return touches_; }
 
   bool sleeps(std::uint32_t body) const { return sleep_.sleeps(body); }
 
@@ -95,6 +105,7 @@ class Simulation {
   void restore(SimulationState state);
 
  private:
+  void find_pulls();
   void find_contacts(StepRecord& record);
   void solve(StepRecord& record);
   void sleep();
@@ -110,7 +121,10 @@ class Simulation {
   Islands islands_;
   std::vector<ContactPoint> found_;
   ContactCache cache_;
+  Touches touches_;
   Sleep sleep_;
+  std::vector<BodyForce> forces_;  // of each body; empty: none
+  std::vector<Pull> pulls_;
   std::uint64_t step_ = 0;
 };
 

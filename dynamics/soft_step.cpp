@@ -23,8 +23,6 @@ class SoftStep {
       : p_(problem),
         contacts_(input.contacts),
         slop_(options.slop),
-        friction_(options.friction),
-        rolling_resistance_(options.rolling_resistance),
         substeps_(options.substeps),
         h_(input.dt / options.substeps),
         between_movers_(softness(1 / (8 * h_), 10, h_)),
@@ -64,7 +62,7 @@ class SoftStep {
     for (std::size_t i = 0; i < target.size(); ++i) {
       target[i] = is_rebound(i) ? p_.rebound[i] : -std::max(0.0, followed_[i]) / h_;
     }
-    return residual_of(p_, target, friction_, 1.0 / substeps_);
+    return residual_of(p_, target, 1.0 / substeps_);
   }
 
  private:
@@ -143,7 +141,7 @@ class SoftStep {
 
   void visit_friction(std::size_t i) {
     Vector3& impulse = p_.impulse[i];
-    const double bound = friction_ * impulse.x;
+    const double bound = p_.friction[i] * impulse.x;
     const double w1 = p_.along(p_.first[i], i, p_.velocity) + p_.drive[i].y;
     const double w2 = p_.along(p_.second[i], i, p_.velocity) + p_.drive[i].z;
     double next1 = impulse.y - friction_mass_[i] * w1, next2 = impulse.z - friction_mass_[i] * w2;
@@ -158,7 +156,7 @@ class SoftStep {
   void visit_turning(TouchingPair& pair) {
     double push = 0;
     for (std::uint32_t contact = pair.begin; contact < pair.end; ++contact) push += p_.impulse[contact].x;
-    const double bound = rolling_resistance_ * push;
+    const double bound = pair.rolling_resistance * push;
     const Vector3 turning = p_.turning(pair, p_.velocity) + pair.drive;
     Vector3 next = pair.impulse - turning / pair.mobility;
     const double size = norm(next);
@@ -178,7 +176,6 @@ class SoftStep {
   IslandProblem& p_;
   std::span<const ContactPoint> contacts_;
   double slop_;
-  double friction_, rolling_resistance_;
   std::uint32_t substeps_;
   double h_;
   Softness between_movers_, against_unmoved_;

@@ -11,9 +11,10 @@ namespace {
 
 // Moves by the mean velocity of the step, which is exact.
 void fly(const StepInput& input, std::uint32_t body, std::span<BodyState> states) {
-  const Vector3 gain = input.dt * input.gravity;
+  const Vector3 gain = input.dt * input.pulls[body].linear, turn = input.dt * input.pulls[body].angular;
   states[body].velocity += gain;
-  advance(input.bodies[body], states[body], -0.5 * gain, Vector3{}, input.dt);
+  states[body].angular_velocity += turn;
+  advance(input.bodies[body], states[body], -0.5 * gain, -0.5 * turn, input.dt);
 }
 
 // Returns whether factorising the island's matrix costs no more than what Newton's method has to do for each
@@ -75,6 +76,18 @@ class IslandSolver final : public StepSolver {
 };
 
 }  // namespace
+
+Material mixed_material(const BodyProperties& a, const BodyProperties& b, const SolverOptions& options) {
+  const auto said = [](double number, double otherwise) { return number >= 0 ? number : otherwise; };
+  const auto larger = [&](double Material::* number, double otherwise) {
+    return std::max(said(a.material.*number, otherwise), said(b.material.*number, otherwise));
+  };
+  const double friction_a = said(a.material.friction, options.friction),
+               friction_b = said(b.material.friction, options.friction);
+  return {friction_a == friction_b ? friction_a : std::sqrt(friction_a * friction_b),
+          larger(&Material::restitution, options.restitution),
+          larger(&Material::rolling_resistance, options.rolling_resistance)};
+}
 
 void StepSolver::sum_up(const Islands& islands, std::span<const Residual> residuals) {
   statistics_ = {};

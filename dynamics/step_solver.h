@@ -20,7 +20,7 @@ struct SolverOptions {
   SolverKind kind = SolverKind::automatic;
   std::uint32_t substeps = 16;  ///< parts of a step that share its contacts, whose points move with the
                                 ///< bodies
-  double friction = 0.5;
+  double friction = 0.5;   ///< of bodies whose material says nothing, as the next
   double restitution = 0;
   double slop = 5e-4;                ///< a length: penetration that is left alone, and how far bodies that
                                      ///< touch may move against each other until contacts are found anew
@@ -30,16 +30,28 @@ struct SolverOptions {
   double correction = 0.2;  ///< part of the rest of penetration that one step takes away, 0 to 1; Newton's
 };
 
+/// Returns the numbers of two bodies that touch, none of them less than 0.
+Material mixed_material(const BodyProperties& a, const BodyProperties& b, const SolverOptions& options);
+
 /// The data of which a solver makes a step.
 struct StepInput {
   std::span<const BodyProperties> bodies;
   std::span<const ContactPoint> contacts;
   const Islands& islands;  ///< of these contacts
   double dt;
-  Vector3 gravity;
+  std::span<const Pull> pulls;  ///< of each body
   std::uint64_t number;  ///< of the step
   bool is_cold;          ///< there are no impulses of a step before
   Threads& threads;
+
+  /// Returns what is added to the velocity of any point of a body in a second, at most; 0 of a body that
+  /// contacts do not move.
+  double pull_of(std::uint32_t body) const {
+    return bodies[body].motion == Motion::moving ? pulls[body].most() : 0;
+  }
+  double pull_of(const ContactPoint& contact) const {
+    return std::max(pull_of(contact.body_a), pull_of(contact.body_b));
+  }
 };
 
 /// Says what a solution leaves undone: the natural map of the complementarity problem, row by row the

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <new>
 #include <optional>
 #include <stdexcept>
@@ -30,12 +31,13 @@ struct World::Parts {
   std::shared_ptr<const char> placed;  // of these bodies alone; null where there are none
   std::vector<BodyMotion> bodies;
   std::vector<WorldContact> contacts;
+  std::vector<ObjectPair> began, ended;  // in the last call
   double time = 0;
   std::uint64_t where = 0;
 
   void clear() {
     simulation.reset(), placed.reset();
-    bodies.clear(), contacts.clear();
+    bodies.clear(), contacts.clear(), began.clear(), ended.clear();
     time = 0, where = 0;
   }
   void read();
@@ -56,13 +58,27 @@ bool is_option(double x, double least, double most) {
   return x >= least && x <= most;
 }
 
+constexpr double kMost = 1e6;  // of options that are numbers
+
 Status check(const WorldOptions& options) {
-  constexpr double kMost = 1e6;
   bool good = is_option(options.friction, 0, kMost) && is_option(options.restitution, 0, 1) &&
               options.slop <= kMost && options.rolling_resistance <= kMost &&
               is_option(options.substeps, 1, 10'000) && is_option(options.threads, 1, kMostSceneThreads);
   for (const double g : options.gravity) good = good && is_option(g, -kMost, kMost);
   return good ? Status::kOk : Status::kBadOption;
+}
+
+bool is_usable_start(const BodyDescription& body, const BodyState& state) {
+  const Material& material = body.material;
+  return is_usable(state) && std::isfinite(body.gravity_scale) && material.friction <= kMost &&
+         material.restitution <= 1 && material.rolling_resistance <= kMost;
+}
+
+// Adds pairs to others; both are ascending.
+void add(std::span<const ObjectPair> pairs, std::vector<ObjectPair>& to) {
+  std::vector<ObjectPair> all;
+  std::ranges::set_union(to, pairs, std::back_inserter(all));
+  to.swap(all);
 }
 
 // Masses of assets, found once.
@@ -154,12 +170,13 @@ Status World::set_bodies(std::span<const BodyDescription> bodies, const WorldOpt
       if (!is_rigid(from.pose)) return fail(Status::kPoseNotRigid, i);
       const Status status = masses.find(from, all[i]);
       if (status != Status::kOk) return fail(status, i);
+      all[i].material = from.material, all[i].gravity_scale = from.gravity_scale;
       states[i] = state_of(all[i], from.pose);
       if (all[i].motion != Motion::fixed) {
         states[i].velocity = vector_of(from.velocity);
         states[i].angular_velocity = vector_of(from.angular_velocity);
       }
-      if (!is_usable(states[i])) return fail(Status::kOutOfRange, i);
+      if (!is_usable_start(from, states[i])) return fail(Status::kOutOfRange, i);
       parts.group.push_back(from.filter.group), parts.mask.push_back(from.filter.mask);
     }
     const Status excludes = parts.excluded.set(excluded);
@@ -229,6 +246,7 @@ Status World::step(double dt, std::uint32_t steps) {
   Status status = Status::kOk;
   std::uint64_t blamed = 0;
   try {
+    parts.began.clear(), parts.ended.clear();
     simulation.set_step(dt);
     for (std::uint32_t i = 0; i < steps && status == Status::kOk; ++i) {
       SimulationState before = simulation.save();
@@ -243,10 +261,13 @@ Status World::step(double dt, std::uint32_t steps) {
       const auto lost = std::ranges::find_if_not(states, is_usable);
       if (status == Status::kOk && lost != states.end())
         status = Status::kOutOfRange, blamed = static_cast<std::uint64_t>(lost - states.begin());
-      if (status != Status::kOk)
+      if (status != Status::kOk) {
         simulation.restore(std::move(before));
-      else
-        parts.time += dt;
+        continue;
+      }
+      parts.time += dt;
+      add(simulation.touches().began(), parts.began);
+      add(simulation.touches().ended(), parts.ended);
     }
     parts.read();
     parts.read_contacts();
@@ -265,6 +286,19 @@ std::span<const BodyMotion> World::bodies() const {
 std::span<const WorldContact> World::contacts() const {
   return parts_ != nullptr ? std::span<const WorldContact>(parts_->contacts)
                            : std::span<const WorldContact>();
+}
+
+std::span<const ObjectPair> World::touching() const {
+  return parts_ != nullptr && parts_->simulation != nullptr ? parts_->simulation->touches().touching()
+                                                            : std::span<const ObjectPair>();
+}
+
+std::span<const ObjectPair> World::began() const {
+  return parts_ != nullptr ? std::span<const ObjectPair>(parts_->began) : std::span<const ObjectPair>();
+}
+
+std::span<const ObjectPair> World::ended() const {
+  return parts_ != nullptr ? std::span<const ObjectPair>(parts_->ended) : std::span<const ObjectPair>();
 }
 
 double World::time() const {
@@ -303,6 +337,20 @@ Status World::push(std::uint32_t body, const double (&impulse)[3], const double 
   return fail(Status::kOk);
 }
 
+Status World::set_force(std::uint32_t body, const double (&force)[3], const double (&torque)[3]) {
+  if (body >= bodies().size()) return fail(Status::kUnknownInstance, body);
+  if (parts_->simulation->bodies()[body].motion != Motion::moving) return fail(Status::kOk);
+  const BodyForce to = {vector_of(force), vector_of(torque)};
+  if (!is_finite(to.force) || !is_finite(to.torque)) return fail(Status::kOutOfRange, body);
+  try {
+    parts_->simulation->set_force(body, to);
+  } catch (const std::bad_alloc&) {
+    return fail(Status::kOutOfMemory);
+  }
+  parts_->read();
+  return fail(Status::kOk);
+}
+
 Status World::save(std::shared_ptr<const State>& state) const {
   if (parts_ == nullptr) return Status::kOutOfMemory;
   try {
@@ -324,7 +372,7 @@ Status World::restore(const State& state) {
   try {
     parts_->simulation->restore(state.simulation);
     parts_->time = state.time;
-    parts_->contacts.clear();
+    parts_->contacts.clear(), parts_->began.clear(), parts_->ended.clear();
     parts_->read();
   } catch (const std::bad_alloc&) {
     return fail(Status::kOutOfMemory);

@@ -97,11 +97,11 @@ TEST(World, ContactsCarryTheWeight) {
 }
 
 TEST(World, ABounceIsAsHighAsRestitutionSays) {
-  for (const double restitution : {1.0, 0.8, 0.5}) {
+  for (const auto& [restitution, of_floor] : {std::pair{1.0, -1.0}, {0.8, -1.0}, {0.5, -1.0}, {0.8, 0.0}}) {
     for (double drop = 0.5; drop < 2; drop += 0.17) {
       WorldOnGround scene(sphere(0.5, 3));
-      scene.add(shift(0.3, 0.2, 0.5 + drop));
-      World& world = scene.begin({.restitution = restitution});
+      scene.add(shift(0.3, 0.2, 0.5 + drop)).material.restitution = of_floor < 0 ? -1 : restitution;
+      World& world = scene.begin({.restitution = of_floor < 0 ? restitution : of_floor});
       double highest = 0;
       for (bool rises = false; world.time() < 2;) {
         ASSERT_EQ(world.step(kStep), Status::kOk);
@@ -122,6 +122,131 @@ TEST(World, ABallRollsOn) {
   World& world = scene.begin({.rolling_resistance = 0});
   ASSERT_EQ(world.step(kStep, 300), Status::kOk);
   EXPECT_NEAR(world.bodies()[1].centre[0], -5, 0.25);  // 10 m; until contacts were let roll, 6
+}
+
+TEST(World, ABlockSlidesOnASlopeThatIsSteeperThanTheMeanOfFrictions) {
+  const double friction = 0.4;  // of 0.2 and 0.8
+  for (const double part : {0.9, 1.1}) {
+    const double angle = std::atan(part * friction);
+    WorldOnGround scene(box(1, 1, 0.5f));
+    scene.bodies[0].material.friction = 0.2;
+    scene.add(shift(0, 0, 0.25)).material.friction = 0.8;
+    World& world = scene.begin({.gravity = {kGravity * std::sin(angle), 0, -kGravity * std::cos(angle)}});
+    ASSERT_EQ(world.step(kStep, 120), Status::kOk);
+    const double gained = std::max(0.0, kGravity * (std::sin(angle) - friction * std::cos(angle)));
+    EXPECT_NEAR(world.bodies()[1].velocity[0], 2 * gained, 0.02 * gained + 1e-6);
+    EXPECT_EQ(world.bodies()[1].sleeps, part < 1);
+  }
+}
+
+TEST(World, AForceLastsUntilItIsChanged) {
+  WorldOnGround scene(box(1, 1, 1));  // a tonne
+  scene.add(shift(-10, 0, 0.5)).material.friction = 0.32;
+  scene.add(shift(0, 0, 20));
+  scene.add(shift(5, 0, 20)).gravity_scale = 0;
+  scene.bodies[0].material.friction = 0.5;
+  World& world = scene.begin();
+  const double friction = 0.4, weight = 1000 * kGravity;
+  ASSERT_EQ(world.set_force(1, {6000, 0, 0}, {0, 0, 0}), Status::kOk);
+  ASSERT_EQ(world.set_force(2, {0, 0, weight}, {0, 0, 1000.0 / 6}), Status::kOk);
+  ASSERT_EQ(world.set_force(0, {0, 0, 1e9}, {0, 0, 0}), Status::kOk);  // it stays where it is
+  ASSERT_EQ(world.step(kStep, 60), Status::kOk);
+  EXPECT_NEAR(world.bodies()[1].velocity[0], 6 - friction * kGravity, 1e-3);
+  EXPECT_NEAR(world.bodies()[1].centre[0], -10 + 0.5 * (6 - friction * kGravity), 0.02);
+  EXPECT_NEAR(world.bodies()[2].angular_velocity[2], 1, 1e-9);
+  EXPECT_NEAR(std::atan2(world.bodies()[2].pose.rotation[1][0], world.bodies()[2].pose.rotation[0][0]), 0.5,
+              1e-9);
+  for (const std::uint32_t body : {2, 3}) EXPECT_NEAR(world.bodies()[body].centre[2], 20, 1e-9);
+  EXPECT_EQ(world.bodies()[3].velocity[2], 0);
+
+  // Saved states have their forces.
+  std::shared_ptr<const World::State> state;
+  ASSERT_EQ(world.save(state), Status::kOk);
+  ASSERT_EQ(world.step(kStep, 10), Status::kOk);
+  const double then = world.bodies()[1].centre[0];
+  ASSERT_EQ(world.set_force(1, {3000, 0, 0}, {0, 0, 0}), Status::kOk);
+  ASSERT_EQ(world.step(kStep, 240), Status::kOk);
+  EXPECT_TRUE(world.bodies()[1].sleeps);  // friction has stopped it
+  ASSERT_EQ(world.set_force(1, {3000, 0, 0}, {0, 0, 0}), Status::kOk);
+  EXPECT_TRUE(world.bodies()[1].sleeps);
+  ASSERT_EQ(world.set_force(1, {6000, 0, 0}, {0, 0, 0}), Status::kOk);
+  EXPECT_FALSE(world.bodies()[1].sleeps);
+  ASSERT_EQ(world.restore(*state), Status::kOk);
+  ASSERT_EQ(world.step(kStep, 10), Status::kOk);
+  EXPECT_EQ(world.bodies()[1].centre[0], then);
+}
+
+using Pairs = std::vector<ObjectPair>;
+
+Pairs copied(std::span<const ObjectPair> pairs) {
+  return {pairs.begin(), pairs.end()};
+}
+
+TEST(World, ABallThatBouncesTwiceBeginsAndEndsToTouchInTheStepsOfTheClosedForm) {
+  constexpr double kDrop = 1.3, kRestitution = 0.8;
+  constexpr int kSteps = 100;
+  // Until a ball meets the ground that is so high above it and rises so fast, in steps.
+  const auto falls = [](double height, double rises) {
+    const double time = (rises + std::sqrt(rises * rises + 2 * kGravity * height)) / kGravity;
+    return static_cast<int>(time / kStep);
+  };
+  const Pairs touching = {{0, 1}}, none;
+  for (const bool in_one_call : {false, true}) {
+    WorldOnGround scene(sphere(0.5, 3));
+    scene.add(shift(0.3, 0.2, 0.5 + kDrop)).material.restitution = kRestitution;
+    World& world = scene.begin();
+    if (in_one_call) {
+      ASSERT_EQ(world.step(kStep, kSteps), Status::kOk);
+      EXPECT_EQ(copied(world.began()), touching);
+      EXPECT_EQ(copied(world.ended()), touching);
+      EXPECT_TRUE(world.touching().empty());
+      ASSERT_EQ(world.step(kStep, 0), Status::kOk);
+      EXPECT_TRUE(world.began().empty() && world.ended().empty());
+      continue;
+    }
+    const int first = falls(kDrop, 0);
+    int second = kSteps;
+    for (int i = 0; i < kSteps; ++i) {
+      ASSERT_EQ(world.step(kStep), Status::kOk);
+      const bool meets = i == first || i == second;
+      EXPECT_EQ(copied(world.touching()), meets ? touching : none) << i;
+      EXPECT_EQ(copied(world.began()), meets ? touching : none) << i;
+      const BodyMotion& ball = world.bodies()[1];
+      if (i == first) second = i + 1 + falls(ball.centre[2] - 0.5, ball.velocity[2]);
+      EXPECT_EQ(copied(world.ended()), i == first + 1 || i == second + 1 ? touching : none) << i;
+    }
+  }
+}
+
+TEST(World, BodiesThatSleepOnEachOtherGoOnTouching) {
+  WorldOnGround scene(box(1, 1, 1));
+  scene.add(shift(0, 0, 0.5));
+  scene.add(shift(0.2, 0.1, 1.5));
+  scene.add(shift(4, 0, 0.6));
+  World& world = scene.begin();
+  ASSERT_EQ(world.step(kStep, 30), Status::kOk);
+  const Pairs all = {{0, 1}, {0, 3}, {1, 2}};
+  EXPECT_EQ(copied(world.began()), all);
+  while (!world.bodies()[2].sleeps || !world.bodies()[3].sleeps) {
+    ASSERT_EQ(world.step(kStep), Status::kOk);
+    ASSERT_LT(world.time(), 5);
+  }
+  std::shared_ptr<const World::State> state;
+  ASSERT_EQ(world.save(state), Status::kOk);
+  BodyMotion away = world.bodies()[2];
+  away.pose.translation[2] += 2;
+  for (const bool again : {false, true}) {
+    ASSERT_EQ(world.step(kStep), Status::kOk);
+    EXPECT_TRUE(world.contacts().empty() && world.began().empty() && world.ended().empty()) << again;
+    EXPECT_EQ(copied(world.touching()), all);
+    ASSERT_EQ(world.set(2, away), Status::kOk);
+    ASSERT_EQ(world.step(kStep), Status::kOk);
+    EXPECT_EQ(copied(world.touching()), (Pairs{{0, 1}, {0, 3}}));
+    EXPECT_EQ(copied(world.ended()), (Pairs{{1, 2}}));
+    ASSERT_EQ(world.restore(*state), Status::kOk);
+    EXPECT_TRUE(world.ended().empty());
+    EXPECT_EQ(copied(world.touching()), all);
+  }
 }
 
 TEST(World, ARodThatSpinsFastKeepsItsEnergy) {
@@ -254,6 +379,10 @@ TEST(World, RefusesWhatItCannotMove) {
   refused([](BodyDescription& body) { body.density = 0; }, Status::kNoMass);
   refused([](BodyDescription& body) { body.density = kNan; }, Status::kNoMass);
   refused([](BodyDescription& body) { body.velocity[1] = kNan; }, Status::kOutOfRange);
+  refused([](BodyDescription& body) { body.gravity_scale = kNan; }, Status::kOutOfRange);
+  refused([](BodyDescription& body) { body.material.friction = kNan; }, Status::kOutOfRange);
+  refused([](BodyDescription& body) { body.material.restitution = 1.1; }, Status::kOutOfRange);
+  refused([](BodyDescription& body) { body.material.rolling_resistance = 2e6; }, Status::kOutOfRange);
   for (const WorldOptions& options :
        {WorldOptions{.friction = -1}, WorldOptions{.restitution = 1.1}, WorldOptions{.slop = kNan},
         WorldOptions{.substeps = 0}, WorldOptions{.threads = 0}, WorldOptions{.gravity = {0, kNan, 0}}})
@@ -262,6 +391,8 @@ TEST(World, RefusesWhatItCannotMove) {
   for (const double dt : {0.0, -1.0, kNan, 1001.0}) EXPECT_EQ(world.step(dt), Status::kBadDuration);
   EXPECT_EQ(world.set(2, world.bodies()[1]), Status::kUnknownInstance);
   EXPECT_EQ(world.push(9, {1, 0, 0}, {0, 0, 0}), Status::kUnknownInstance);
+  EXPECT_EQ(world.set_force(9, {1, 0, 0}, {0, 0, 0}), Status::kUnknownInstance);
+  EXPECT_EQ(world.set_force(1, {0, 0, 0}, {kNan, 0, 0}), Status::kOutOfRange);
   EXPECT_EQ(world.push(1, {kNan, 0, 0}, {0, 0, 0}), Status::kOutOfRange);
   EXPECT_EQ(world.step(kStep), Status::kOk);
 }

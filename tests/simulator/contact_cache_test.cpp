@@ -34,7 +34,8 @@ struct BoxOnSlab {
       poses.push_back(pose_of(bodies[i], states[i]));
       radii.push_back(bodies[i].radius);
     }
-    cache.update(found, judge.kept(pairs, poses, radii, kReach), bodies, states, idle, kGap);
+    cache.update(found, judge.kept(pairs, poses, radii, kReach), bodies, states, idle,
+                 std::vector<double>(bodies.size(), kGap));
     return {cache.contacts().begin(), cache.contacts().end()};
   }
 

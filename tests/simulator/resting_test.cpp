@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 
 #include "analytic_contacts.h"
 #include "kernels/manifold/manifold_scene.h"
@@ -65,8 +66,11 @@ struct Slope {
   Vector3 normal;
 };
 
-Simulator block_on(const Slope& slope, const Vector3& size, const SimulatorOptions& options) {
-  return Simulator(bodies_with(1, size), {BodyState(), slope.resting(size.z, options.solver.slop)},
+Simulator block_on(const Slope& slope, const Vector3& size, const SimulatorOptions& options,
+                   const Material& ground = {}, const Material& block = {}) {
+  std::vector<BodyProperties> bodies = bodies_with(1, size);
+  bodies[0].material = ground, bodies[1].material = block;
+  return Simulator(std::move(bodies), {BodyState(), slope.resting(size.z, options.solver.slop)},
                    boxes_on_plane(slope.normal, size), options);
 }
 
@@ -94,8 +98,12 @@ TEST_P(EverySolver, ABlockSticksBelowTheAngleOfFrictionAndSlipsAbove) {
     const double limit = std::atan(friction) * 180 / M_PI;
     SimulatorOptions options = options_of(GetParam());
     options.solver.friction = friction;
-    for (const double degrees : {0.99 * limit, 1.01 * limit}) {
-      Simulator simulator = block_on(Slope(degrees), flat, options);
+    // The geometric mean of their materials' frictions is that of the options.
+    const Material rough = {.friction = 2 * friction}, smooth = {.friction = friction / 2};
+    for (const auto& [degrees, ground, block] :
+         {std::tuple{0.99 * limit, Material(), Material()}, {1.01 * limit, Material(), Material()},
+          {0.99 * limit, rough, smooth}, {1.01 * limit, smooth, rough}}) {
+      Simulator simulator = block_on(Slope(degrees), flat, options, ground, block);
       const Vector3 start = simulator.states()[1].position;
       for (int i = 0; i < 600; ++i) simulator.step();
       const double moved = norm(simulator.states()[1].position - start);
@@ -149,6 +157,56 @@ TEST_P(EverySolver, RestitutionGivesTheSpeedBack) {
   Simulator simulator(bodies_with(1, kCube), states, boxes_on_plane(kUp, kCube), options);
   for (int i = 0; i < 2; ++i) simulator.step();
   EXPECT_NEAR(simulator.states()[1].velocity.z, 2, GetParam() == SolverMethod::soft ? 1e-3 : 1e-9);
+}
+
+TEST_P(EverySolver, ABodyBouncesAsTheLargerRestitutionSays) {
+  for (const double floor : {0.0, 0.9}) {
+    SimulatorOptions options = options_of(GetParam());
+    options.solver.restitution = floor;
+    options.gravity = {};
+    std::vector<BodyState> states = tower(1, 1, 0);
+    states[1].position.z += 1e-9;
+    states[1].velocity.z = -4;
+    std::vector<BodyProperties> bodies = bodies_with(1, kCube);
+    bodies[1].material.restitution = 0.5;
+    Simulator simulator(bodies, states, boxes_on_plane(kUp, kCube), options);
+    for (int i = 0; i < 2; ++i) simulator.step();
+    EXPECT_NEAR(simulator.states()[1].velocity.z, 4 * std::max(floor, 0.5),
+                GetParam() == SolverMethod::soft ? 2e-3 : 1e-9);
+  }
+}
+
+TEST_P(EverySolver, ALastingForceMovesABlockAgainstFriction) {
+  const Vector3 flat = {1, 1, 0.2};
+  for (const double force : {4.0, 9.0}) {  // the weight times friction is 4.9
+    Simulator simulator = block_on(Slope(0), flat, options_of(GetParam()));
+    const Vector3 start = simulator.states()[1].position;
+    simulator.set_force(1, {{0.6 * force, 0.8 * force, 0}, {}});
+    for (int i = 0; i < 120; ++i) simulator.step();
+    const Vector3 way = simulator.states()[1].position - start;
+    const double gained = std::max(0.0, force - 0.5 * kGravity);
+    EXPECT_NEAR(norm(way), 0.5 * gained * 4, gained > 0 ? 0.02 * norm(way) : 1e-4);
+    EXPECT_NEAR(norm(simulator.states()[1].velocity), gained * 2, 1e-3);
+    EXPECT_NEAR(dot(way, {0.6, 0.8, 0}), norm(way), gained > 0 ? 1e-6 : 1e-4);
+  }
+}
+
+// As in a world without gravity whose bodies are as heavy by forces: nothing depends on gravity alone.
+TEST_P(EverySolver, ForcesActAsGravityDoes) {
+  Vector3 ends[2], speeds[2];
+  for (const bool by_force : {false, true}) {
+    SimulatorOptions options = options_of(GetParam());
+    auto states = tower(3, 1, options.solver.slop);
+    states[3].position.z += 0.3;
+    options.solver.restitution = 0.4;
+    if (by_force) options.gravity = {};
+    Simulator simulator(bodies_with(3, kCube), states, boxes_on_plane(kUp, kCube), options);
+    for (std::uint32_t i = 1; by_force && i < 4; ++i) simulator.set_force(i, {{0, 0, -kGravity}, {}});
+    for (int i = 0; i < 60; ++i) simulator.step();
+    ends[by_force] = simulator.states()[3].position, speeds[by_force] = simulator.states()[3].velocity;
+  }
+  EXPECT_LT(norm(ends[0] - ends[1]), 1e-9);
+  EXPECT_LT(norm(speeds[0] - speeds[1]), 1e-9);
 }
 
 TEST(Resting, ATowerStands) {
@@ -277,10 +335,11 @@ class Rolling : public testing::TestWithParam<SolverMethod> {
                  const Vector3& plane_spin = Vector3{}) const {
     SimulatorOptions options;
     options.solver.method = GetParam();
-    options.solver.rolling_resistance = resistance;
+    options.solver.rolling_resistance = 0.5 * resistance;
     const Vector3 normal = {std::sin(slope), 0, std::cos(slope)};
     std::vector<BodyProperties> bodies = {fixed_body(), ball_body(kRadius, kMass)};
     bodies[0].motion = plane;
+    bodies[1].material.rolling_resistance = resistance;  // the larger one
     std::vector<BodyState> states(2);
     states[0].angular_velocity = plane_spin;
     states[1].position = (kRadius - options.solver.slop) * normal;

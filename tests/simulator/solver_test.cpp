@@ -116,16 +116,18 @@ struct OneStep {
   }
   IslandProblem problem() {
     islands = find_islands(bodies, contacts);
+    pulls.assign(bodies.size(), {-kGravity * kUp, {}});
     const std::vector<ContactImpulse> none(contacts.size());
     std::vector<std::uint32_t> place(bodies.size());
     return make_island_problem(input(), 0, {states, none}, options, find_layers(bodies, contacts), place);
   }
-  StepInput input() const { return {bodies, contacts, islands, kDt, -kGravity * kUp, 0, true, one_thread()}; }
+  StepInput input() const { return {bodies, contacts, islands, kDt, pulls, 0, true, one_thread()}; }
 
   static constexpr double kDt = 1.0 / 60;
   std::vector<BodyProperties> bodies;
   std::vector<BodyState> states;
   std::vector<ContactPoint> contacts;
+  std::vector<Pull> pulls;
   Islands islands;
   SolverOptions options;
 };

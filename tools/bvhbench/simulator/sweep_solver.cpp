@@ -31,6 +31,7 @@ struct Joint {
   std::uint32_t a, b;
   double inverse_mass_a, inverse_mass_b;
   Row tangent[2], normal;
+  double friction;      // Coulomb's coefficient
   double target;        // of w along the normal
   double push;          // of the correction along the normal
   double push_impulse;  // that of the correction
@@ -78,8 +79,8 @@ Law law_of_normal(const Joint& joint) {
   return {joint.target, 0, kUnbounded};
 }
 
-Law law_of_friction(const Joint& joint, double friction) {
-  const double bound = friction * joint.normal.impulse;
+Law law_of_friction(const Joint& joint) {
+  const double bound = joint.friction * joint.normal.impulse;
   return {0, -bound, bound};
 }
 
@@ -94,9 +95,9 @@ double visit(const Joint& joint, Row& row, const Law& law, Mover& a, Mover& b, c
   return std::fabs(change) * moves;
 }
 
-double visit_velocity(Joint& joint, std::vector<Mover>& movers, double friction, const Held& held) {
+double visit_velocity(Joint& joint, std::vector<Mover>& movers, const Held& held) {
   Mover &a = movers[joint.a], &b = movers[joint.b];
-  const Law slip = law_of_friction(joint, friction);
+  const Law slip = law_of_friction(joint);
   const double first = visit(joint, joint.tangent[0], slip, a, b, held);
   const double second = visit(joint, joint.tangent[1], slip, a, b, held);
   return std::max({first, second, visit(joint, joint.normal, law_of_normal(joint), a, b, held)});
@@ -132,7 +133,7 @@ Row make_row(const Vector3& direction, const Vector3& from_a, const Vector3& fro
 Joint make_joint(const ContactPoint& contact, std::span<const BodyState> states,
                  const std::vector<Mover>& movers, const TestBedSolverOptions& options,
                  const StepInput& part) {
-  const double gravity_speed = part.dt * norm(part.gravity);
+  const double gravity_speed = part.dt * part.pull_of(contact);
   constexpr double kSlips = 0.01;      // of what gravity gives in a step
   constexpr double kBouncesAbove = 2;  // times that
   const Mover &a = movers[contact.body_a], &b = movers[contact.body_b];
@@ -149,7 +150,9 @@ Joint make_joint(const ContactPoint& contact, std::span<const BodyState> states,
   joint.tangent[0] = make_row(first, from_a, from_b, a, b);
   joint.tangent[1] = make_row(cross(contact.normal, first), from_a, from_b, a, b);
   joint.normal = make_row(contact.normal, from_a, from_b, a, b);
-  joint.target = approach > kBouncesAbove * gravity_speed ? options.restitution * approach : 0;
+  const Material material = mixed_material(part.bodies[joint.a], part.bodies[joint.b], options);
+  joint.friction = material.friction;
+  joint.target = approach > kBouncesAbove * gravity_speed ? material.restitution * approach : 0;
   if (contact.depth < 0) joint.target = contact.depth / part.dt;
   joint.push = options.correction * std::max(0.0, contact.depth - options.slop) / part.dt;
   joint.push_impulse = 0;
@@ -157,10 +160,10 @@ Joint make_joint(const ContactPoint& contact, std::span<const BodyState> states,
 }
 
 // Starts a contact with an impulse of the step before.
-void warm_start(Joint& joint, const ContactImpulse& impulse, double friction, std::vector<Mover>& movers) {
+void warm_start(Joint& joint, const ContactImpulse& impulse, std::vector<Mover>& movers) {
   Mover &a = movers[joint.a], &b = movers[joint.b];
   joint.normal.impulse = impulse.normal;
-  const double bound = friction * impulse.normal;
+  const double bound = joint.friction * impulse.normal;
   for (Row& row : joint.tangent)
     row.impulse = std::clamp(dot(row.direction, impulse.tangential), -bound, bound);
   for (const Row* row : {&joint.tangent[0], &joint.tangent[1], &joint.normal}) {
@@ -196,7 +199,7 @@ class IslandSweeps {
   // still: sweeps that change no velocity by more than this are the last.
   void solve(double still) {
     for (std::uint32_t i = 0; i < options_.iterations; ++i) {
-      const auto visit = [&](Joint& joint) { return visit_velocity(joint, movers_, options_.friction, {}); };
+      const auto visit = [&](Joint& joint) { return visit_velocity(joint, movers_, {}); };
       if (sweep(i % 2 == 1, visit) <= still) break;
     }
     if (!needs_correction()) return;
@@ -219,7 +222,7 @@ class IslandSweeps {
           Joint& joint = joints_[order_[at]];
           const Held held = {layers[joint.a] < layers[joint.b] ? 0.0 : 1.0,
                              layers[joint.b] < layers[joint.a] ? 0.0 : 1.0};
-          visit_velocity(joint, movers_, options_.friction, held);
+          visit_velocity(joint, movers_, held);
           visit_correction(joint, corrections_, held);
         }
       }
@@ -231,7 +234,7 @@ class IslandSweeps {
     for (const std::uint32_t i : order_) {
       const Joint& joint = joints_[i];
       const Mover &a = movers_[joint.a], &b = movers_[joint.b];
-      const Law slip = law_of_friction(joint, options_.friction);
+      const Law slip = law_of_friction(joint);
       for (const Row& row : joint.tangent) all.add(residual_of(row, slip, a, b));
       all.add(residual_of(joint.normal, law_of_normal(joint), a, b));
     }
@@ -323,9 +326,11 @@ class SweepSolver final : public StepSolver {
     for (std::uint32_t i = 0; i < options.substeps; ++i) {
       if (i > 0) followed.follow(states);
       for (std::size_t body = 0; body < states.size(); ++body) {
-        if (input.bodies[body].motion == Motion::moving) states[body].velocity += dt * input.gravity;
+        if (input.bodies[body].motion != Motion::moving) continue;
+        states[body].velocity += dt * input.pulls[body].linear;
+        states[body].angular_velocity += dt * input.pulls[body].angular;
       }
-      solve({input.bodies, followed.contacts(), input.islands, dt, input.gravity,
+      solve({input.bodies, followed.contacts(), input.islands, dt, input.pulls,
              input.number * options.substeps + i, input.is_cold, input.threads},
             options, states, impulses);
       for (std::size_t body = 0; body < states.size(); ++body) {
@@ -368,12 +373,14 @@ class SweepSolver final : public StepSolver {
                         std::span<const std::uint32_t> layers) {
     constexpr double kStill = 1e-9;  // of what gravity gives in a step
     if (options.warm_start) {
-      for (const std::uint32_t j : members) warm_start(joints_[j], impulses[j], options.friction, movers_);
+      for (const std::uint32_t j : members) warm_start(joints_[j], impulses[j], movers_);
     }
     IslandSweeps solver(members, joints_, movers_, corrections_, options);
     if (options.order == ContactOrder::shuffled)
       solver.shuffle_order(options.seed ^ (part.number * 0x9E3779B97F4A7C15u + members.front()));
-    solver.solve(kStill * (part.dt * norm(part.gravity)));
+    double pull = 0;
+    for (const std::uint32_t j : members) pull = std::max(pull, part.pull_of(part.contacts[j]));
+    solver.solve(kStill * (part.dt * pull));
     if (options.shock_propagation) solver.propagate_shock(layers);
     return solver.residual();
   }

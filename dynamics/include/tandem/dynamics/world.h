@@ -3,6 +3,7 @@
 #include <memory>
 #include <span>
 
+#include "tandem/dynamics/material.h"
 #include "tandem/kernels/scene.h"
 
 namespace tandem {
@@ -16,6 +17,8 @@ struct BodyDescription {
                           ///< 1/100 of its diagonal where it is open
   double velocity[3] = {};  ///< of its centre of mass; a kinematic body keeps its velocities
   double angular_velocity[3] = {};
+  Material material;
+  double gravity_scale = 1;  ///< part of the world's gravity that acts on it; 0: it floats
 };
 
 /// The place of a body, and how it moves.
@@ -38,7 +41,8 @@ struct WorldContact {
 
 struct WorldOptions {
   double gravity[3] = {0, 0, -9.81};
-  double friction = 0.5;   ///< Coulomb's coefficient
+  double friction = 0.5;   ///< Coulomb's coefficient; as the next and rolling resistance, of bodies whose
+                           ///< material says nothing
   double restitution = 0;  ///< part of the speed that an impact gives back, 0 to 1
   double slop = -1;        ///< overlap that is left alone; less than 0: 1/4000 of the least diagonal of
                            ///< an asset of a moving body
@@ -66,7 +70,8 @@ class World {
   Status set_assets(std::span<const AssetView> assets);
 
   /// Places all bodies anew, at time 0. excluded: pairs that are not to meet. Result: kOk; as of
-  /// Scene::place(), and where() is the body; kOutOfRange where a velocity is not finite; kNoTopology where
+  /// Scene::place(), and where() is the body; kOutOfRange where a velocity or gravity_scale is not finite, or a number of
+  /// the material is larger than WorldOptions may have; kNoTopology where
   /// its mesh has none, and kNoMass where it has no extent or the density is not positive, of a moving body;
   /// kBadOption, where where() is 0: an option is out of its range; kOutOfMemory. After an error there are no
   /// bodies.
@@ -85,6 +90,15 @@ class World {
   /// Valid until the next call.
   std::span<const WorldContact> contacts() const;
 
+  /// Return pairs of bodies, ascending. touching: those that touch in the last step: at its start they had a
+  /// contact that is no gap, or one of their contacts pushed in it. Two bodies that sleep go on as they were.
+  /// began, ended: those that came to touch, or to touch no longer, in any of the steps of the last call of
+  /// step(); a pair that bounced in the call is in both. touching() less began() have touched all along, but
+  /// for pairs that are in ended() too. Valid until the next call; restore() leaves began and ended empty.
+  std::span<const ObjectPair> touching() const;
+  std::span<const ObjectPair> began() const;
+  std::span<const ObjectPair> ended() const;
+
   /// Returns the seconds of all steps since set_bodies().
   double time() const;
 
@@ -98,6 +112,11 @@ class World {
   /// Adds to a moving body's velocities what an impulse at a point of the world does, and wakes it. Result:
   /// kOk; kUnknownInstance; kOutOfRange where a number is not finite.
   Status push(std::uint32_t body, const double (&impulse)[3], const double (&at)[3]);
+
+  /// Sets a force that acts on a moving body's centre of mass in all steps from now on, in newtons, and a torque
+  /// about it, in newton metres, both along the world's axes, in place of those before. They are 0 at the start,
+  /// and save() keeps them. Wakes the body where they are not what they were. Result: as of push().
+  Status set_force(std::uint32_t body, const double (&force)[3], const double (&torque)[3]);
 
   /// Keeps all that the next steps depend on, and goes back to it. restore() takes what save() of this world
   /// made since its bodies were placed. Result: kOk; kKeptMismatch of another state; kOutOfMemory.

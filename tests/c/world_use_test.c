@@ -71,7 +71,11 @@ static void test_options_start_and_filter(void) {
   // Without gravity and at a speed; half as heavy.
   tandem_world_options options = {.struct_size = sizeof options, .no_gravity = 1, .no_sleeping = 1};
   const double density[] = {500}, velocity[] = {0, 0, 2}, turning[] = {0, 0, 1};
-  tandem_body_start start = {sizeof start, 0, 1, density, velocity, turning};
+  tandem_body_start start = {.struct_size = sizeof start,
+                             .count = 1,
+                             .density = density,
+                             .velocity = velocity,
+                             .angular_velocity = turning};
   const tandem_instance bodies[] = {at(0, 0, 0), at(0, 0, 0.9)};
   tandem_world* world = world_of(&options);
   CHECK_STATUS(tandem_world_set_bodies(world, bodies, 1, NULL, &start), TANDEM_OK);
@@ -85,7 +89,7 @@ static void test_options_start_and_filter(void) {
   tandem_excluded_pairs* excluded = NULL;
   CHECK_STATUS(tandem_excluded_pairs_create(&pair, 1, NULL, &excluded), TANDEM_OK);
   tandem_pair_filter filter = {sizeof filter, 0, 2, motion, NULL, NULL, excluded};
-  start = (tandem_body_start){sizeof start, 0, 2, NULL, speeds, NULL};
+  start = (tandem_body_start){.struct_size = sizeof start, .count = 2, .velocity = speeds};
   CHECK_STATUS(tandem_world_set_bodies(world, bodies, 2, &filter, &start), TANDEM_OK);
   CHECK_STATUS(tandem_world_step(world, 0.01, 50), TANDEM_OK);
   CHECK(fabs(body_of(world, 0)->pose.translation[2] - 0.5) < 1e-9);
@@ -124,6 +128,43 @@ static void test_state(void) {
   CHECK(state == NULL);
   tandem_world_state_destroy(state);
   tandem_world_destroy(other);
+}
+
+static void test_materials_forces_and_touches(void) {
+  static const uint8_t motion[] = {TANDEM_FIXED, TANDEM_MOVING, TANDEM_MOVING};
+  const tandem_pair_filter filter = {.struct_size = sizeof filter, .count = 3, .motion = motion};
+  const tandem_instance bodies[] = {at(0, 0, 0), at(0, 0, 1), at(0, 0, 3)};
+  const double friction[] = {0.2, 0.8, -1}, restitution[] = {-1, 0, -1}, resistance[] = {0, 0.1, 0};
+  const double scale[] = {1, 1, 0};
+  const tandem_body_start start = {.struct_size = sizeof start,
+                                   .count = 3,
+                                   .friction = friction,
+                                   .restitution = restitution,
+                                   .rolling_resistance = resistance,
+                                   .gravity_scale = scale};
+  const double weak[] = {0.9 * 0.4 * 9810, 0, 0}, strong[] = {0.5 * 9810, 0, 0}, none[] = {0, 0, 0};
+  tandem_world* world = world_of(NULL);
+  size_t count = 7;
+  CHECK_STATUS(tandem_world_set_bodies(world, bodies, 3, &filter, &start), TANDEM_OK);
+  CHECK(tandem_world_touching(world, &count) == NULL && count == 0);
+  CHECK_STATUS(tandem_world_set_force(world, 1, weak, none), TANDEM_OK);
+  CHECK_STATUS(tandem_world_step(world, 1.0 / 60, 60), TANDEM_OK);
+  CHECK(fabs(body_of(world, 1)->centre[0]) < 1e-3 && body_of(world, 2)->centre[2] == 3);
+  const tandem_object_pair* began = tandem_world_began(world, &count);
+  CHECK(count == 1 && began[0].a == 0 && began[0].b == 1);
+  CHECK(tandem_world_ended(world, &count) == NULL && count == 0);
+  CHECK_STATUS(tandem_world_set_force(world, 1, strong, none), TANDEM_OK);
+  CHECK_STATUS(tandem_world_step(world, 1.0 / 60, 30), TANDEM_OK);
+  CHECK(fabs(body_of(world, 1)->velocity[0] - 0.5 * 0.1 * 9.81) < 0.01);
+  CHECK(tandem_world_touching(world, &count) != NULL && count == 1);
+  CHECK(tandem_world_began(world, &count) == NULL && count == 0);
+  // It is pulled up.
+  const double up[] = {0, 0, 3 * 9810};
+  CHECK_STATUS(tandem_world_set_force(world, 1, up, none), TANDEM_OK);
+  CHECK_STATUS(tandem_world_step(world, 1.0 / 60, 10), TANDEM_OK);
+  const tandem_object_pair* ended = tandem_world_ended(world, &count);
+  CHECK(count == 1 && ended[0].a == 0 && ended[0].b == 1 && tandem_world_touching(world, NULL) == NULL);
+  tandem_world_destroy(world);
 }
 
 static void check_options(tandem_world_options options, tandem_status expected) {
@@ -172,6 +213,11 @@ static void test_bad_bodies(void) {
   CHECK_STATUS(tandem_world_set_bodies(world, bodies, 2, &filter, &start), TANDEM_OUT_OF_RANGE);
   CHECK(tandem_world_where(world) == 1 && tandem_world_bodies(world, &count) == NULL && count == 0);
   start.velocity = NULL;
+  numbers[0] = 2;
+  start.restitution = numbers;
+  CHECK_STATUS(tandem_world_set_bodies(world, bodies, 2, &filter, &start), TANDEM_OUT_OF_RANGE);
+  CHECK(tandem_world_where(world) == 0);
+  start.restitution = NULL;
   numbers[0] = 1000;
   numbers[1] = -1;
   start.density = numbers;
@@ -244,6 +290,7 @@ static void test_bad_calls(void) {
   CHECK_STATUS(tandem_world_step(NULL, 1, 1), TANDEM_NULL_ARGUMENT);
   CHECK_STATUS(tandem_world_set_body(NULL, 0, NULL), TANDEM_NULL_ARGUMENT);
   CHECK_STATUS(tandem_world_push(NULL, 0, zeros, zeros), TANDEM_NULL_ARGUMENT);
+  CHECK_STATUS(tandem_world_set_force(NULL, 0, zeros, zeros), TANDEM_NULL_ARGUMENT);
   CHECK_STATUS(tandem_world_restore(NULL, NULL), TANDEM_NULL_ARGUMENT);
   CHECK(tandem_world_bodies(NULL, &count) == NULL && count == 0 && tandem_world_contacts(NULL, NULL) == NULL);
   CHECK(tandem_world_time(NULL) == 0 && tandem_world_mass(NULL, 0) == 0 && tandem_world_where(NULL) == 0);
@@ -260,6 +307,9 @@ static void test_bad_calls(void) {
   CHECK_STATUS(tandem_world_push(world, 1, numbers, zeros), TANDEM_OUT_OF_RANGE);
   CHECK_STATUS(tandem_world_push(world, 1, zeros, numbers), TANDEM_OUT_OF_RANGE);
   CHECK_STATUS(tandem_world_push(world, 1, NULL, zeros), TANDEM_NULL_ARGUMENT);
+  CHECK_STATUS(tandem_world_set_force(world, 2, zeros, zeros), TANDEM_UNKNOWN_INSTANCE);
+  CHECK_STATUS(tandem_world_set_force(world, 1, zeros, numbers), TANDEM_OUT_OF_RANGE);
+  CHECK_STATUS(tandem_world_set_force(world, 1, NULL, zeros), TANDEM_NULL_ARGUMENT);
   tandem_body_motion motion = *body_of(world, 1);
   CHECK_STATUS(tandem_world_set_body(world, 1, NULL), TANDEM_NULL_ARGUMENT);
   CHECK_STATUS(tandem_world_set_body(world, 2, &motion), TANDEM_UNKNOWN_INSTANCE);
@@ -319,6 +369,7 @@ int main(int argc, char** argv) {
   tandem_asset* cow = build_obj(argv[1], "cow_1500.obj", NULL);
   test_rest();
   test_options_start_and_filter();
+  test_materials_forces_and_touches();
   test_state();
   test_bad_options();
   test_bad_bodies();

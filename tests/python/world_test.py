@@ -108,6 +108,65 @@ def test_bodies_are_pushed_and_moved():
     assert np.allclose(belt.translation, [[0, 1, 0]])
 
 
+def test_materials_of_bodies():
+    for frictions, slides in (([0.2, 0.8], False), ([0.2, 0.6], True), ([0.2, -1], True), (0.4, False)):
+        world = pair(friction=frictions, gravity=[0.9 * 0.4 * 9.81, 0, -9.81])
+        world.step(1 / 60, 60)
+        assert (world.velocity[1, 0] > 0.1) == slides, frictions
+    for restitutions in ([-1, 0.9], [0.9, 0], 0.9):
+        world = pair(1.5, restitution=restitutions, rolling_resistance=[0.01, -1])
+        world.step(1 / 60, 20)
+        assert world.velocity[1, 2] > 2
+    floats = pair(3, gravity_scale=[1, 0])
+    floats.step(1 / 60, 60)
+    assert floats.translation[1, 2] == 3
+    floats.place(translation=[0, 0, 3], gravity_scale=0.5, friction=-1, restitution=0.5, rolling_resistance=0)
+    floats.step(1 / 60, 60)
+    assert floats.translation[0, 2] == pytest.approx(3 - 0.25 * 9.81)
+
+
+def test_forces_last_and_are_kept():
+    world = pair(friction=0.4)
+    world.step(1 / 60, 60)
+    assert world.sleeping[1]
+    world.set_force(1, [3000, 0, 0])
+    world.step(1 / 60, 60)
+    assert world.sleeping[1] and world.translation[1, 0] == pytest.approx(0.2, abs=1e-3)
+    world.set_force(1, [5000, 0, 0])
+    assert not world.sleeping[1]
+    kept = world.save()
+    world.step(1 / 60, 30)
+    then = states(world)
+    assert world.velocity[1, 0] == pytest.approx((5 - 0.4 * 9.81) / 2, rel=0.01)
+    world.set_force(1)
+    world.restore(kept)
+    world.step(1 / 60, 30)
+    assert states(world) == then
+    world = tandem.World([BOX], translation=np.zeros(3), gravity=np.zeros(3))
+    world.set_force(0, torque=[0, 0, 1000 / 6])
+    world.step(1 / 60, 60)
+    assert np.allclose(world.angular_velocity, [[0, 0, 1]])
+
+
+def test_what_touches_is_told():
+    world, ones = pair(1.3, restitution=[0, 0.8], sleeping=False), pair(1.3, restitution=[0, 0.8], sleeping=False)
+    kept = world.save()
+    began, ended = [], []
+    for _ in range(60):
+        ones.step(1 / 60)
+        began += ones.began.tolist()
+        ended += ones.ended.tolist()
+    assert began.count((0, 1)) >= 2 and ended.count((0, 1)) >= 1
+    world.step(1 / 60, 60)
+    assert world.touching.dtype == tandem.PAIR and world.began.tolist() == world.ended.tolist() == [(0, 1)]
+    assert world.touching.tolist() == ones.touching.tolist()
+    world.step(1 / 60, 0)
+    assert len(world.began) == len(world.ended) == 0
+    world.step(1 / 60, 60)
+    world.restore(kept)
+    assert len(world.touching) == len(world.began) == len(world.ended) == 0
+
+
 def test_filters_and_no_bodies():
     world = tandem.World([BOX], translation=[[0, 0, 0], [0, 0, 1]], filter=tandem.Filter(motion=[tandem.FIXED, tandem.SLEEPING], excluded=[[1, 0]]))
     world.step(1 / 60, 30)
@@ -171,6 +230,14 @@ def test_a_restored_world_goes_on_alike():
     (lambda w: w.place(translation=np.zeros(3), filter=tandem.Filter(excluded=[[0, 5]])), tandem.Error, "pair 0"),
     (lambda w: w.place(translation=np.zeros(3), filter="fixed"), TypeError, "filter is str"),
     (lambda w: tandem.World([BOX, tandem.build(*solids.box(1, 1, 1), topology=False)], asset=[0, 1]), tandem.Error, "asset 1"),
+    (lambda w: w.place(translation=np.zeros((2, 3)), friction=[1, np.nan]), ValueError, "friction of body 1 is nan"),
+    (lambda w: tandem.World([BOX], translation=np.zeros(3), restitution=[1.5]), ValueError, "restitution of body 0 is 1.5 where at most 1"),
+    (lambda w: tandem.World([BOX], translation=np.zeros(3), friction=[1, 2]), ValueError, "friction has 2 rows where there are 1 bodies"),
+    (lambda w: tandem.World([BOX], rolling_resistance=[1]), TypeError, "instances is missing"),
+    (lambda w: w.place(translation=np.zeros(3), gravity_scale=np.inf), tandem.Error, "instance 0: .*not finite"),
+    (lambda w: w.set_force(2, np.zeros(3)), ValueError, "body is 2 where 0 to 1"),
+    (lambda w: w.set_force(1, [1, 2]), ValueError, "force has shape"),
+    (lambda w: w.set_force(1, torque=[0, 0, np.inf]), tandem.Error, "not finite"),
     (lambda w: w.step(0), ValueError, "dt is 0"),
     (lambda w: w.step(np.nan), ValueError, "dt is nan"),
     (lambda w: w.step("1"), TypeError, "dt is str"),

@@ -460,6 +460,10 @@ public unsafe struct tandem_body_start {
   public double* density;
   public double* velocity;
   public double* angular_velocity;
+  public double* friction;
+  public double* restitution;
+  public double* rolling_resistance;
+  public double* gravity_scale;
 }
 
 [StructLayout(LayoutKind.Sequential)]
@@ -671,10 +675,14 @@ public static unsafe class Native {
   [DllImport("tandem")] public static extern uint tandem_world_step(IntPtr world, double dt, uint steps);
   [DllImport("tandem")] public static extern tandem_body_motion* tandem_world_bodies(IntPtr world, UIntPtr* count);
   [DllImport("tandem")] public static extern tandem_world_contact* tandem_world_contacts(IntPtr world, UIntPtr* count);
+  [DllImport("tandem")] public static extern tandem_object_pair* tandem_world_touching(IntPtr world, UIntPtr* count);
+  [DllImport("tandem")] public static extern tandem_object_pair* tandem_world_began(IntPtr world, UIntPtr* count);
+  [DllImport("tandem")] public static extern tandem_object_pair* tandem_world_ended(IntPtr world, UIntPtr* count);
   [DllImport("tandem")] public static extern double tandem_world_time(IntPtr world);
   [DllImport("tandem")] public static extern double tandem_world_mass(IntPtr world, uint body);
   [DllImport("tandem")] public static extern uint tandem_world_set_body(IntPtr world, uint body, tandem_body_motion* motion);
   [DllImport("tandem")] public static extern uint tandem_world_push(IntPtr world, uint body, double* impulse, double* at);
+  [DllImport("tandem")] public static extern uint tandem_world_set_force(IntPtr world, uint body, double* force, double* torque);
   [DllImport("tandem")] public static extern uint tandem_world_save(IntPtr world, IntPtr* state);
   [DllImport("tandem")] public static extern uint tandem_world_restore(IntPtr world, IntPtr state);
   [DllImport("tandem")] public static extern void tandem_world_state_destroy(IntPtr state);

@@ -662,6 +662,10 @@ pub struct tandem_body_start {
     pub density: *const f64,
     pub velocity: *const f64,
     pub angular_velocity: *const f64,
+    pub friction: *const f64,
+    pub restitution: *const f64,
+    pub rolling_resistance: *const f64,
+    pub gravity_scale: *const f64,
 }
 
 #[repr(C)]
@@ -748,10 +752,14 @@ extern "C" {
     pub fn tandem_world_step(world: *mut tandem_world, dt: f64, steps: u32) -> tandem_status;
     pub fn tandem_world_bodies(world: *const tandem_world, count: *mut usize) -> *const tandem_body_motion;
     pub fn tandem_world_contacts(world: *const tandem_world, count: *mut usize) -> *const tandem_world_contact;
+    pub fn tandem_world_touching(world: *const tandem_world, count: *mut usize) -> *const tandem_object_pair;
+    pub fn tandem_world_began(world: *const tandem_world, count: *mut usize) -> *const tandem_object_pair;
+    pub fn tandem_world_ended(world: *const tandem_world, count: *mut usize) -> *const tandem_object_pair;
     pub fn tandem_world_time(world: *const tandem_world) -> f64;
     pub fn tandem_world_mass(world: *const tandem_world, body: u32) -> f64;
     pub fn tandem_world_set_body(world: *mut tandem_world, body: u32, motion: *const tandem_body_motion) -> tandem_status;
     pub fn tandem_world_push(world: *mut tandem_world, body: u32, impulse: *const f64, at: *const f64) -> tandem_status;
+    pub fn tandem_world_set_force(world: *mut tandem_world, body: u32, force: *const f64, torque: *const f64) -> tandem_status;
     pub fn tandem_world_save(world: *const tandem_world, state: *mut *mut tandem_world_state) -> tandem_status;
     pub fn tandem_world_restore(world: *mut tandem_world, state: *const tandem_world_state) -> tandem_status;
     pub fn tandem_world_state_destroy(state: *mut tandem_world_state);

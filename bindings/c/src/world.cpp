@@ -47,6 +47,21 @@ tandem_status enter(tandem_world* world, const Body& body) noexcept {
   });
 }
 
+template <typename Row, typename Of>
+const Row* rows_of(const tandem_world* world, std::span<const Of> (World::*get)() const, size_t* count) {
+  return result<Row>(world != nullptr ? (world->world.*get)() : std::span<const Of>(), count);
+}
+
+// Calls a function of one body and two vectors.
+template <typename Function>
+tandem_status call_with_two(tandem_world* world, Function call, uint32_t body, const double* p,
+                            const double* q) noexcept {
+  return enter(world, [&](tandem_world& self) -> tandem_status {
+    if (p == nullptr || q == nullptr) return TANDEM_NULL_ARGUMENT;
+    return self.told((self.world.*call)(body, {p[0], p[1], p[2]}, {q[0], q[1], q[2]}));
+  });
+}
+
 // An option that a flag says to be 0; left alone where it has its default. False: both say something, or one
 // says what it cannot.
 bool read_option(uint32_t is_zero, double given, double& option) {
@@ -80,8 +95,9 @@ tandem_status read_options(const tandem_world_options* given, WorldOptions& opti
 tandem_status read_start(const tandem_body_start* given, size_t bodies, tandem_body_start& read) {
   if (const tandem_status status = read_struct(given, read); status != TANDEM_OK) return status;
   if (read.reserved != 0) return TANDEM_BAD_OPTION;
-  const bool has_rows =
-      read.density != nullptr || read.velocity != nullptr || read.angular_velocity != nullptr;
+  const double* const rows[] = {read.density,     read.velocity,           read.angular_velocity, read.friction,
+                                read.restitution, read.rolling_resistance, read.gravity_scale};
+  const bool has_rows = std::ranges::any_of(rows, [](const double* row) { return row != nullptr; });
   return has_rows && read.count != bodies ? TANDEM_MOTION_MISMATCH : TANDEM_OK;
 }
 
@@ -118,7 +134,12 @@ tandem_status set_bodies(tandem_world& self, const tandem_instance* instances, s
     if (read.motion != nullptr) body.filter.motion = static_cast<Motion>(read.motion[i]);
     if (read.group != nullptr) body.filter.group = read.group[i];
     if (read.mask != nullptr) body.filter.mask = read.mask[i];
-    if (starts.density != nullptr) body.density = starts.density[i];
+    const auto take = [i](const double* from, double& to) { to = from != nullptr ? from[i] : to; };
+    take(starts.density, body.density);
+    take(starts.friction, body.material.friction);
+    take(starts.restitution, body.material.restitution);
+    take(starts.rolling_resistance, body.material.rolling_resistance);
+    take(starts.gravity_scale, body.gravity_scale);
     if (starts.velocity != nullptr) std::copy_n(starts.velocity + 3 * i, 3, body.velocity);
     if (starts.angular_velocity != nullptr)
       std::copy_n(starts.angular_velocity + 3 * i, 3, body.angular_velocity);
@@ -164,13 +185,23 @@ tandem_status tandem_world_step(tandem_world* world, double dt, uint32_t steps) 
 }
 
 const tandem_body_motion* tandem_world_bodies(const tandem_world* world, size_t* count) {
-  return result<tandem_body_motion>(world != nullptr ? world->world.bodies() : std::span<const BodyMotion>(),
-                                    count);
+  return rows_of<tandem_body_motion>(world, &World::bodies, count);
 }
 
 const tandem_world_contact* tandem_world_contacts(const tandem_world* world, size_t* count) {
-  return result<tandem_world_contact>(
-      world != nullptr ? world->world.contacts() : std::span<const WorldContact>(), count);
+  return rows_of<tandem_world_contact>(world, &World::contacts, count);
+}
+
+const tandem_object_pair* tandem_world_touching(const tandem_world* world, size_t* count) {
+  return rows_of<tandem_object_pair>(world, &World::touching, count);
+}
+
+const tandem_object_pair* tandem_world_began(const tandem_world* world, size_t* count) {
+  return rows_of<tandem_object_pair>(world, &World::began, count);
+}
+
+const tandem_object_pair* tandem_world_ended(const tandem_world* world, size_t* count) {
+  return rows_of<tandem_object_pair>(world, &World::ended, count);
 }
 
 double tandem_world_time(const tandem_world* world) {
@@ -193,10 +224,12 @@ tandem_status tandem_world_set_body(tandem_world* world, uint32_t body, const ta
 }
 
 tandem_status tandem_world_push(tandem_world* world, uint32_t body, const double* impulse, const double* at) {
-  return enter(world, [&](tandem_world& self) -> tandem_status {
-    if (impulse == nullptr || at == nullptr) return TANDEM_NULL_ARGUMENT;
-    return self.told(self.world.push(body, {impulse[0], impulse[1], impulse[2]}, {at[0], at[1], at[2]}));
-  });
+  return call_with_two(world, &World::push, body, impulse, at);
+}
+
+tandem_status tandem_world_set_force(tandem_world* world, uint32_t body, const double* force,
+                                     const double* torque) {
+  return call_with_two(world, &World::set_force, body, force, torque);
 }
 
 tandem_status tandem_world_save(const tandem_world* world, tandem_world_state** state) {

@@ -1,5 +1,9 @@
+#include <algorithm>
 #include <chrono>
+#include <iterator>
 #include <memory>
+#include <tuple>
+#include <utility>
 
 #include "core.h"
 
@@ -32,6 +36,8 @@ std::vector<double> numbers_of(nb::handle given, std::size_t bodies, std::size_t
 }
 
 class World {
+  using Pairs = std::vector<tandem_object_pair>;
+
  public:
   World(nb::list assets, nb::handle gravity, nb::handle friction, double restitution, nb::handle slop,
         nb::handle rolling_resistance, std::uint32_t substeps, bool sleeping, bool continuous,
@@ -60,17 +66,25 @@ class World {
   }
 
   void set_bodies(nb::handle instances, const Filter* filter, nb::handle density, nb::handle velocity,
-                  nb::handle angular_velocity) {
+                  nb::handle angular_velocity, nb::handle friction, nb::handle restitution,
+                  nb::handle rolling_resistance, nb::handle gravity_scale) {
     const Turn turn = take_turn();
     const auto rows = copy_rows<tandem_instance>(instances);
-    const std::vector<double> densities = numbers_of(density, rows.size(), 1),
-                              velocities = numbers_of(velocity, rows.size(), 3),
-                              angular = numbers_of(angular_velocity, rows.size(), 3);
     auto start = sized<tandem_body_start>();
     start.count = rows.size();
-    if (!densities.empty()) start.density = densities.data();
-    if (!velocities.empty()) start.velocity = velocities.data();
-    if (!angular.empty()) start.angular_velocity = angular.data();
+    std::vector<std::vector<double>> numbers;
+    const auto take = [&](nb::handle given, std::size_t width, const double*& row) {
+      numbers.push_back(numbers_of(given, rows.size(), width));
+      if (!numbers.back().empty()) row = numbers.back().data();
+    };
+    take(density, 1, start.density);
+    take(velocity, 3, start.velocity);
+    take(angular_velocity, 3, start.angular_velocity);
+    take(friction, 1, start.friction);
+    take(restitution, 1, start.restitution);
+    take(rolling_resistance, 1, start.rolling_resistance);
+    take(gravity_scale, 1, start.gravity_scale);
+    began_.clear(), ended_.clear();
     ask([&](tandem_world* world) {
       return tandem_world_set_bodies(world, rows.data(), rows.size(), Filter::of(filter), &start);
     });
@@ -81,12 +95,15 @@ class World {
     using Clock = std::chrono::steady_clock;
     const Turn turn = take_turn();
     std::uint64_t done = 0;
+    began_.clear(), ended_.clear();
     do {
       ask([&](tandem_world* world) {
         const auto soon = Clock::now() + std::chrono::milliseconds(50);
         tandem_status status = TANDEM_OK;
         do {
           status = tandem_world_step(world, dt, done < steps);
+          add<tandem_world_began>(began_);
+          add<tandem_world_ended>(ended_);
         } while (status == TANDEM_OK && ++done < steps && Clock::now() < soon);
         return status;
       });
@@ -101,14 +118,19 @@ class World {
     ask([&](tandem_world* world) { return tandem_world_set_body(world, body, rows.data()); });
   }
 
-  void push(std::uint32_t body, nb::handle impulse, nb::handle at) {
+  // Calls a function of one body and two vectors.
+  template <auto call>
+  void with_two(std::uint32_t body, nb::handle first, nb::handle second) {
     const Turn turn = take_turn();
-    const std::vector<double> by = numbers_of(impulse, 1, 3), point = numbers_of(at, 1, 3);
-    ask([&](tandem_world* world) { return tandem_world_push(world, body, by.data(), point.data()); });
+    const std::vector<double> p = numbers_of(first, 1, 3), q = numbers_of(second, 1, 3);
+    ask([&](tandem_world* world) { return call(world, body, p.data(), q.data()); });
   }
 
   nb::object bodies() { return rows<tandem_world_bodies>(); }
   nb::object contacts() { return rows<tandem_world_contacts>(); }
+  nb::object touching() { return rows<tandem_world_touching>(); }
+  nb::object began() { return copy_of(began_); }
+  nb::object ended() { return copy_of(ended_); }
 
   std::size_t count() {
     const Turn turn = take_turn();
@@ -137,6 +159,7 @@ class World {
 
   void restore(const WorldState& state) {
     const Turn turn = take_turn();
+    began_.clear(), ended_.clear();
     ask([&](tandem_world* world) { return tandem_world_restore(world, state.get()); });
   }
 
@@ -169,6 +192,24 @@ class World {
     return to_python(first, count);
   }
 
+  nb::object copy_of(const Pairs& pairs) {
+    const Turn turn = take_turn();
+    return to_python(pairs.data(), pairs.size());
+  }
+
+  // Adds the pairs of a step to those of the steps before; both are ascending.
+  template <auto get>
+  void add(Pairs& to) const {
+    std::size_t count;
+    const tandem_object_pair* first = get(world_.get(), &count);
+    if (count == 0) return;
+    Pairs all;
+    std::set_union(to.begin(), to.end(), first, first + count, std::back_inserter(all),
+                   [](const auto& p, const auto& q) { return std::tie(p.a, p.b) < std::tie(q.a, q.b); });
+    to = std::move(all);
+  }
+
+  Pairs began_, ended_;  // in the last call of step()
   std::unique_ptr<tandem_world, decltype(&tandem_world_destroy)> world_{nullptr, tandem_world_destroy};
   std::atomic<bool> busy_ = false;
 };
@@ -183,12 +224,17 @@ void add_worlds(nb::module_& module) {
                     bool, std::uint32_t>(),
            nb::arg(), nb::arg(), nb::arg(), nb::arg(), none(), none(), nb::arg(), nb::arg(), nb::arg(),
            nb::arg())
-      .def("set_bodies", &World::set_bodies, nb::arg(), none(), none(), none(), none())
+      .def("set_bodies", &World::set_bodies, nb::arg(), none(), none(), none(), none(), none(), none(),
+           none(), none())
       .def("step", &World::step)
       .def("set_body", &World::set_body)
-      .def("push", &World::push)
+      .def("push", &World::with_two<tandem_world_push>)
+      .def("set_force", &World::with_two<tandem_world_set_force>)
       .def("bodies", &World::bodies)
       .def("contacts", &World::contacts)
+      .def("touching", &World::touching)
+      .def("began", &World::began)
+      .def("ended", &World::ended)
       .def("count", &World::count)
       .def("time", &World::time)
       .def("masses", &World::masses)

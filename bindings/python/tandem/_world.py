@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -11,7 +12,7 @@ from ._arrays import Rotations, Rows, amount, flag, floats, instances_of, number
 from ._asset import Asset
 from ._errors import Error
 from ._poses import explained
-from ._rows import BODY_MOTION, INSTANCE, WORLD_CONTACT
+from ._rows import BODY_MOTION, INSTANCE, PAIR, WORLD_CONTACT
 from ._scene import Filter, _core_of, cores_of
 
 __all__ = ["World", "WorldState"]
@@ -53,18 +54,34 @@ def _of_each(value: npt.ArrayLike | None, name: str, bodies: int, *tail: int) ->
     return np.ascontiguousarray(np.broadcast_to(given, (bodies, *tail)))
 
 
+def _of_world(value: npt.ArrayLike | None, name: str, most: float, default: Any) -> tuple[Any, npt.ArrayLike | None]:
+    """The number of a world, and the numbers of its bodies, of an argument that is either."""
+    if np.ndim(value) > 0:  # type: ignore[arg-type]
+        return default, value
+    return default if value is None else amount(value, name, most), None
+
+
+def _material(value: npt.ArrayLike | None, name: str, bodies: int, most: float = _MOST) -> _Numbers | None:
+    given = _of_each(value, name, bodies)
+    if given is not None and not (given <= most).all():
+        row = int(np.argmin(given <= most))
+        raise ValueError(f"{name} of body {row} is {given[row]} where at most {most:g} is wanted")
+    return given
+
+
 class World:
     """Rigid bodies that move under gravity and contacts, which are exact, for any meshes. Lengths are metres, masses kilograms, times seconds, angles radians.
 
     Args:
         assets: that bodies refer to by their place in this list. The world keeps them.
-        instances, filter, asset, rotation, translation, transform, density, velocity, angular_velocity: bodies, as of `place`; none where none of the poses is
-            given.
+        instances, filter, asset, rotation, translation, transform, density, velocity, angular_velocity, gravity_scale: bodies, as of `place`; none where
+            none of the poses is given.
         gravity: (3,).
-        friction: Coulomb's coefficient.
-        restitution: part of the speed that an impact gives back, 0 to 1.
+        friction: Coulomb's coefficient; (n,): of each body, as of `place`, and that of the world is 0.5.
+        restitution: part of the speed that an impact gives back, 0 to 1; (n,): of each body, and that of the world is 0.
         slop: overlap that is left alone; None: 1/4000 of the least diagonal of an asset of a moving body.
-        rolling_resistance: lever at which the force between two bodies resists that they turn against each other; None: 16 slops.
+        rolling_resistance: lever at which the force between two bodies resists that they turn against each other; None: 16 slops; (n,): of each
+            body, and that of the world is 16 slops.
         substeps: parts of a step that share its contacts, 1 to 10,000.
         sleeping: bodies that rest with all that they touch are left alone.
         continuous: fast bodies are carried to where they first meet others.
@@ -84,23 +101,25 @@ class World:
     def __init__(self, assets: Iterable[Asset], instances: Rows | None = None, *, filter: Filter | None = None, asset: npt.ArrayLike | None = None,
                  rotation: Rotations | None = None, translation: npt.ArrayLike | None = None, transform: npt.ArrayLike | None = None,
                  density: npt.ArrayLike = 1000.0, velocity: npt.ArrayLike | None = None, angular_velocity: npt.ArrayLike | None = None,
-                 gravity: npt.ArrayLike = (0.0, 0.0, -9.81), friction: float = 0.5, restitution: float = 0.0, slop: float | None = None,
-                 rolling_resistance: float | None = None, substeps: int = 16, sleeping: bool = True, continuous: bool = False, threads: int = 1):
+                 gravity_scale: npt.ArrayLike = 1.0, gravity: npt.ArrayLike = (0.0, 0.0, -9.81), friction: npt.ArrayLike = 0.5, restitution: npt.ArrayLike = 0.0,
+                 slop: float | None = None, rolling_resistance: npt.ArrayLike | None = None, substeps: int = 16, sleeping: bool = True, continuous: bool = False, threads: int = 1):
+        world_friction, frictions = _of_world(friction, "friction", _MOST, 0.5)
+        world_restitution, restitutions = _of_world(restitution, "restitution", 1.0, 0.0)
+        world_lever, levers = _of_world(rolling_resistance, "rolling_resistance", _MOST, None)
         self._core = _tandem.World(
-            cores_of(assets), _gravity(gravity), amount(friction, "friction", _MOST), amount(restitution, "restitution", 1.0),
-            None if slop is None else amount(slop, "slop", _MOST),
-            None if rolling_resistance is None else amount(rolling_resistance, "rolling_resistance", _MOST), whole_number(substeps, "substeps", 1, 10_000),
-            flag(sleeping, "sleeping"), flag(continuous, "continuous"), whole_number(threads, "threads", 1, 1024))
+            cores_of(assets), _gravity(gravity), world_friction, world_restitution, None if slop is None else amount(slop, "slop", _MOST),
+            world_lever, whole_number(substeps, "substeps", 1, 10_000), flag(sleeping, "sleeping"), flag(continuous, "continuous"), whole_number(threads, "threads", 1, 1024))
         self._asset = np.zeros(0, np.uint32)
         if not (instances is None and asset is None and rotation is None and translation is None and transform is None):
             self.place(instances, filter=filter, asset=asset, rotation=rotation, translation=translation, transform=transform, density=density, velocity=velocity,
-                       angular_velocity=angular_velocity)
-        elif filter is not None or velocity is not None or angular_velocity is not None:
+                       angular_velocity=angular_velocity, friction=frictions, restitution=restitutions, rolling_resistance=levers, gravity_scale=gravity_scale)
+        elif any(given is not None for given in (filter, velocity, angular_velocity, frictions, restitutions, levers)):
             raise TypeError("instances is missing, or asset, rotation, translation or transform")
 
     def place(self, instances: Rows | None = None, *, filter: Filter | None = None, asset: npt.ArrayLike | None = None, rotation: Rotations | None = None,
               translation: npt.ArrayLike | None = None, transform: npt.ArrayLike | None = None, density: npt.ArrayLike = 1000.0,
-              velocity: npt.ArrayLike | None = None, angular_velocity: npt.ArrayLike | None = None) -> World:
+              velocity: npt.ArrayLike | None = None, angular_velocity: npt.ArrayLike | None = None, friction: npt.ArrayLike | None = None,
+              restitution: npt.ArrayLike | None = None, rolling_resistance: npt.ArrayLike | None = None, gravity_scale: npt.ArrayLike = 1.0) -> World:
         """Places all bodies anew, at time 0. Returns the world.
 
         Args:
@@ -109,14 +128,19 @@ class World:
             density: () or (n,), of bodies that move. The mass is that of what the mesh encloses; an open mesh is a shell, a hundredth of its diagonal thick.
             velocity: (3,) or (n, 3), of the centre of mass; 0 where it is not given.
             angular_velocity: (3,) or (n, 3); 0 where it is not given.
+            friction, restitution, rolling_resistance: () or (n,); None, or less than 0: as of the world. Two bodies that touch have the geometric mean of their
+                frictions, the larger restitution and the larger rolling resistance.
+            gravity_scale: () or (n,), the part of gravity that acts on a body; 0: it floats.
 
         Raises:
-            Error: as of `Scene.place`; a velocity that is not finite; a moving body whose mesh has no topology or no extent, or whose density is not positive. There
+            Error: as of `Scene.place`; a velocity or gravity_scale that is not finite; a moving body whose mesh has no topology or no extent, or whose density is not positive. There
                 are no bodies then.
         """
         bodies = instances_of(instances, asset, rotation, translation, transform)
         given = (_of_each(density, "density", len(bodies)), _of_each(velocity, "velocity", len(bodies), 3),
-                 _of_each(angular_velocity, "angular_velocity", len(bodies), 3))
+                 _of_each(angular_velocity, "angular_velocity", len(bodies), 3), _material(friction, "friction", len(bodies)),
+                 _material(restitution, "restitution", len(bodies), 1.0), _material(rolling_resistance, "rolling_resistance", len(bodies)),
+                 _of_each(gravity_scale, "gravity_scale", len(bodies)))
         self._asset = np.zeros(0, np.uint32)
         try:
             self._core.set_bodies(bodies, _core_of(filter), *given)
@@ -134,9 +158,7 @@ class World:
         duration = number(dt, "dt")
         if not 0 < duration <= 1000:
             raise ValueError(f"dt is {duration} where more than 0 and at most 1000 is wanted")
-        count = whole_number(steps, "steps", 0, 2**63)
-        if count:
-            self._core.step(duration, count)
+        self._core.step(duration, whole_number(steps, "steps", 0, 2**63))
 
     def move(self, body: int, *, rotation: Rotations | None = None, translation: npt.ArrayLike | None = None, transform: npt.ArrayLike | None = None,
              velocity: npt.ArrayLike | None = None, angular_velocity: npt.ArrayLike | None = None) -> None:
@@ -179,6 +201,22 @@ class World:
         """
         row = self._body(body)
         self._core.push(row, _vector(impulse, "impulse"), np.ascontiguousarray(self.bodies["centre"][row]) if at is None else _vector(at, "at"))
+
+    def set_force(self, body: int, force: npt.ArrayLike = (0.0, 0.0, 0.0), torque: npt.ArrayLike = (0.0, 0.0, 0.0)) -> None:
+        """Sets what acts on a moving body in all steps from now on, beside gravity and contacts, in place of what did before. States keep it. Wakes the body where it
+        is not what it was.
+
+        Args:
+            force: (3,), newtons, at the centre of mass.
+            torque: (3,), newton metres, about it; both along the world's axes.
+
+        >>> world = tandem.World([box], translation=[0, 0, 5])
+        >>> world.set_force(0, [0, 0, world.mass[0] * 9.81])
+        >>> world.step(1 / 60, 60)
+        >>> world.translation.round(6).tolist()
+        [[0.0, 0.0, 5.0]]
+        """
+        self._core.set_force(self._body(body), _vector(force, "force"), _vector(torque, "torque"))
 
     def save(self) -> WorldState:
         """Keeps all that the next steps depend on."""
@@ -259,6 +297,33 @@ class World:
         [0.0, 0.0, 9810.0]
         """
         return np.frombuffer(self._core.contacts(), WORLD_CONTACT)
+
+    @property
+    def touching(self) -> Rows:
+        """The pairs of bodies that touch in the last step, a copy, array of PAIR, ascending: at its start they had a contact that is no gap, or one of their contacts
+        pushed in it. Two bodies that sleep go on as they were.
+
+        >>> world = tandem.World([box], translation=[[0, 0, 0], [0, 0, 1.01]], filter=tandem.Filter(motion=[tandem.FIXED, tandem.MOVING]))
+        >>> for _ in range(5):
+        ...     world.step(1 / 60)
+        ...     print(world.touching.tolist(), "began:", world.began.tolist())
+        [] began: []
+        [] began: []
+        [(0, 1)] began: [(0, 1)]
+        [(0, 1)] began: []
+        [(0, 1)] began: []
+        """
+        return np.frombuffer(self._core.touching(), PAIR)
+
+    @property
+    def began(self) -> Rows:
+        """The pairs that came to touch in any of the steps of the last call of `step`, a copy, array of PAIR, ascending; a pair that bounced is in `ended` too."""
+        return np.frombuffer(self._core.began(), PAIR)
+
+    @property
+    def ended(self) -> Rows:
+        """The pairs that came to touch no longer, as `began`."""
+        return np.frombuffer(self._core.ended(), PAIR)
 
     @property
     def time(self) -> float:

@@ -827,11 +827,18 @@ typedef struct tandem_body_start {
                           ///< open mesh is a shell, a hundredth of its diagonal thick
   const double* velocity;  ///< of the centre of mass, x, y, z of each; null: 0. A kinematic body keeps it
   const double* angular_velocity;  ///< x, y, z of each; null: 0
+  /// Of bodies that touch: they have the geometric mean of their frictions, the larger restitution and the
+  /// larger rolling resistance. Null, or less than 0: as the world's options say.
+  const double* friction;
+  const double* restitution;
+  const double* rolling_resistance;
+  const double* gravity_scale;  ///< part of gravity that acts on each; null: 1. 0: it floats
 } tandem_body_start;
 
 /// Places all bodies anew, at time 0. filter: or null; a sleeping body starts awake. start: or null. Result:
 /// as of tandem_scene_place(); also, where tandem_world_where() is the body, TANDEM_OUT_OF_RANGE of a
-/// velocity that is not finite, and TANDEM_NO_MASS where a moving body's mesh has no extent or its density is
+/// velocity or gravity_scale that is not finite, or of a friction, restitution or rolling resistance that is
+/// larger than options may be, and TANDEM_NO_MASS where a moving body's mesh has no extent or its density is
 /// not positive; TANDEM_NO_TOPOLOGY, where it is the asset. After an error there are no bodies.
 TANDEM_API tandem_status tandem_world_set_bodies(tandem_world* world, const tandem_instance* instances,
                                                  size_t count, const tandem_pair_filter* filter,
@@ -869,6 +876,15 @@ typedef struct tandem_world_contact {
 /// bodies. Valid as long as tandem_world_bodies().
 TANDEM_API const tandem_world_contact* tandem_world_contacts(const tandem_world* world, size_t* count);
 
+/// Return pairs of bodies, a < b, ascending. Valid as long as tandem_world_bodies().
+/// touching: the pairs that touch in the last step: at its start they had a contact that is no gap, or one of
+/// their contacts pushed in it. Two bodies that sleep go on as they were.
+/// began, ended: the pairs that came to touch, or to touch no longer, in any of the steps of the last
+/// tandem_world_step(); a pair that bounced in it is in both. Empty after tandem_world_restore().
+TANDEM_API const tandem_object_pair* tandem_world_touching(const tandem_world* world, size_t* count);
+TANDEM_API const tandem_object_pair* tandem_world_began(const tandem_world* world, size_t* count);
+TANDEM_API const tandem_object_pair* tandem_world_ended(const tandem_world* world, size_t* count);
+
 /// Returns the seconds of all steps since bodies were placed.
 TANDEM_API double tandem_world_time(const tandem_world* world);
 
@@ -885,6 +901,13 @@ TANDEM_API tandem_status tandem_world_set_body(tandem_world* world, uint32_t bod
 /// it; others stay as they are. Result: as of tandem_world_set_body().
 TANDEM_API tandem_status tandem_world_push(tandem_world* world, uint32_t body, const double* impulse,
                                            const double* at);
+
+/// Sets a force that acts on a moving body's centre of mass in all steps from now on, in newtons, and a torque
+/// about it, in newton metres, both x, y, z along the world's axes, in place of those before; others stay as
+/// they are. Both are 0 at the start, and states keep them. Wakes the body where they are not what they were.
+/// Result: as of tandem_world_set_body().
+TANDEM_API tandem_status tandem_world_set_force(tandem_world* world, uint32_t body, const double* force,
+                                                const double* torque);
 
 /// All that the next steps of a world depend on, beside options, assets and what bodies are.
 typedef struct tandem_world_state tandem_world_state;

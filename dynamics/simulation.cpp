@@ -65,8 +65,8 @@ void Simulation::find_contacts(StepRecord& record) {
   std::vector<double> gaps;
   for (const Pull& pull : pulls_) gaps.push_back(kFall * pull.most() * options_.dt * options_.dt);
   if (parts_.ahead)
-    parts_.ahead->add_to(found_, parts_.contacts->kept(), acting_, states_, idle, options_.dt,
-                         pulls_, 0.5 * options_.solver.slop);
+    parts_.ahead->add_to(found_, parts_.contacts->kept(), acting_, states_, idle, options_.dt, pulls_,
+                         0.5 * options_.solver.slop);
   cache_.update(found_, parts_.contacts->kept(), bodies_, states_, idle, gaps);
   record.generation += stopwatch.lap();
   record.contacts = cache_.contacts().size();
@@ -83,9 +83,8 @@ void Simulation::solve(StepRecord& record) {
   std::vector<ContactImpulse> impulses(contacts.size());
   if (options_.solver.warm_start) impulses = cache_.impulses();
   const std::vector<BodyState> before = parts_.continuous ? states_ : std::vector<BodyState>();
-  parts_.solver->step(
-      {acting_, contacts, islands_, options_.dt, pulls_, step_, cache_.is_cold(), threads_},
-      states_, impulses);
+  parts_.solver->step({acting_, contacts, islands_, options_.dt, pulls_, step_, cache_.is_cold(), threads_},
+                      states_, impulses);
   if (parts_.continuous) parts_.continuous->limit(acting_, before, states_, options_.solver.slop);
   cache_.remember(impulses);
   touches_.update(contacts, impulses, idle());
@@ -128,7 +127,8 @@ void Simulation::take_measures(StepRecord& record) const {
     const BodyState& state = states_[i];
     const double speed = norm(state.velocity);
     record.kinetic_energy += kinetic_energy(bodies_[i], state);
-    record.potential_energy -= bodies_[i].gravity_scale * bodies_[i].mass * dot(options_.gravity, state.position);
+    record.potential_energy -=
+        bodies_[i].gravity_scale * bodies_[i].mass * dot(options_.gravity, state.position);
     record.linear_momentum += bodies_[i].mass * state.velocity;
     record.angular_momentum += angular_momentum(bodies_[i], state);
     record.speed_max = std::max(record.speed_max, speed);

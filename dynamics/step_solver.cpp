@@ -79,7 +79,7 @@ class IslandSolver final : public StepSolver {
 
 Material mixed_material(const BodyProperties& a, const BodyProperties& b, const SolverOptions& options) {
   const auto said = [](double number, double otherwise) { return number >= 0 ? number : otherwise; };
-  const auto larger = [&](double Material::* number, double otherwise) {
+  const auto larger = [&](double Material::*number, double otherwise) {
     return std::max(said(a.material.*number, otherwise), said(b.material.*number, otherwise));
   };
   const double friction_a = said(a.material.friction, options.friction),

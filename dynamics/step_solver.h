@@ -20,7 +20,7 @@ struct SolverOptions {
   SolverKind kind = SolverKind::automatic;
   std::uint32_t substeps = 16;  ///< parts of a step that share its contacts, whose points move with the
                                 ///< bodies
-  double friction = 0.5;   ///< of bodies whose material says nothing, as the next
+  double friction = 0.5;        ///< of bodies whose material says nothing, as the next
   double restitution = 0;
   double slop = 5e-4;                ///< a length: penetration that is left alone, and how far bodies that
                                      ///< touch may move against each other until contacts are found anew
@@ -40,8 +40,8 @@ struct StepInput {
   const Islands& islands;  ///< of these contacts
   double dt;
   std::span<const Pull> pulls;  ///< of each body
-  std::uint64_t number;  ///< of the step
-  bool is_cold;          ///< there are no impulses of a step before
+  std::uint64_t number;         ///< of the step
+  bool is_cold;                 ///< there are no impulses of a step before
   Threads& threads;
 
   /// Returns what is added to the velocity of any point of a body in a second, at most; 0 of a body that

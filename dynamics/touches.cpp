@@ -16,9 +16,8 @@ void Touches::update(std::span<const ContactPoint> contacts, std::span<const Con
     if (touches && (touching_.empty() || touching_.back() != pair)) touching_.push_back(pair);
   }
   const auto awake = static_cast<std::ptrdiff_t>(touching_.size());
-  std::ranges::copy_if(before_, std::back_inserter(touching_), [&](const ObjectPair& pair) {
-    return !idle.empty() && idle[pair.a] && idle[pair.b];
-  });
+  std::ranges::copy_if(before_, std::back_inserter(touching_),
+                       [&](const ObjectPair& pair) { return !idle.empty() && idle[pair.a] && idle[pair.b]; });
   std::inplace_merge(touching_.begin(), touching_.begin() + awake, touching_.end());
   std::ranges::set_difference(touching_, before_, std::back_inserter(began_));
   std::ranges::set_difference(before_, touching_, std::back_inserter(ended_));

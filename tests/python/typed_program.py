@@ -84,6 +84,9 @@ def simulate(assets: list[tandem.Asset]) -> None:
     world = tandem.World(assets, asset=[0, 1], rotation=Turn(), translation=[[0.0, 0.0, 0.0], [0.0, 0.0, 2.0]], filter=filter, density=500, velocity=np.zeros(3),
                          angular_velocity=[0, 0, 1], gravity=(0, 0, -1), friction=0.1, restitution=0.5, slop=None, rolling_resistance=0.0, substeps=4,
                          sleeping=True, continuous=True, threads=2)
+    world.set_force(1, [0, 0, 5], torque=np.zeros(3))
+    pairs: list[tuple[int, int]] = world.touching.tolist() + world.began.tolist() + world.ended.tolist()
+    assert not pairs
     state: tandem.WorldState = world.save()
     world.step(1 / 60, steps=10)
     world.push(1, [0, 0, 1], at=np.zeros(3))

@@ -100,9 +100,10 @@ TEST_P(EverySolver, ABlockSticksBelowTheAngleOfFrictionAndSlipsAbove) {
     options.solver.friction = friction;
     // The geometric mean of their materials' frictions is that of the options.
     const Material rough = {.friction = 2 * friction}, smooth = {.friction = friction / 2};
-    for (const auto& [degrees, ground, block] :
-         {std::tuple{0.99 * limit, Material(), Material()}, {1.01 * limit, Material(), Material()},
-          {0.99 * limit, rough, smooth}, {1.01 * limit, smooth, rough}}) {
+    for (const auto& [degrees, ground, block] : {std::tuple{0.99 * limit, Material(), Material()},
+                                                 {1.01 * limit, Material(), Material()},
+                                                 {0.99 * limit, rough, smooth},
+                                                 {1.01 * limit, smooth, rough}}) {
       Simulator simulator = block_on(Slope(degrees), flat, options, ground, block);
       const Vector3 start = simulator.states()[1].position;
       for (int i = 0; i < 600; ++i) simulator.step();

@@ -95,8 +95,9 @@ tandem_status read_options(const tandem_world_options* given, WorldOptions& opti
 tandem_status read_start(const tandem_body_start* given, size_t bodies, tandem_body_start& read) {
   if (const tandem_status status = read_struct(given, read); status != TANDEM_OK) return status;
   if (read.reserved != 0) return TANDEM_BAD_OPTION;
-  const double* const rows[] = {read.density,     read.velocity,           read.angular_velocity, read.friction,
-                                read.restitution, read.rolling_resistance, read.gravity_scale};
+  const double* const rows[] = {read.density,      read.velocity,    read.angular_velocity,
+                                read.friction,     read.restitution, read.rolling_resistance,
+                                read.gravity_scale};
   const bool has_rows = std::ranges::any_of(rows, [](const double* row) { return row != nullptr; });
   return has_rows && read.count != bodies ? TANDEM_MOTION_MISMATCH : TANDEM_OK;
 }

@@ -56,9 +56,9 @@ def _of_each(value: npt.ArrayLike | None, name: str, bodies: int, *tail: int) ->
 
 def _of_world(value: npt.ArrayLike | None, name: str, most: float, default: Any) -> tuple[Any, npt.ArrayLike | None]:
     """The number of a world, and the numbers of its bodies, of an argument that is either."""
-    if np.ndim(value) > 0:  # type: ignore[arg-type]
-        return default, value
-    return default if value is None else amount(value, name, most), None
+    if value is None:
+        return default, None
+    return (default, value) if np.ndim(value) > 0 else (amount(value, name, most), None)
 
 
 def _material(value: npt.ArrayLike | None, name: str, bodies: int, most: float = _MOST) -> _Numbers | None:

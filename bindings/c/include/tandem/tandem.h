@@ -902,10 +902,10 @@ TANDEM_API tandem_status tandem_world_set_body(tandem_world* world, uint32_t bod
 TANDEM_API tandem_status tandem_world_push(tandem_world* world, uint32_t body, const double* impulse,
                                            const double* at);
 
-/// Sets a force that acts on a moving body's centre of mass in all steps from now on, in newtons, and a torque
-/// about it, in newton metres, both x, y, z along the world's axes, in place of those before; others stay as
-/// they are. Both are 0 at the start, and states keep them. Wakes the body where they are not what they were.
-/// Result: as of tandem_world_set_body().
+/// Sets a force that acts on a moving body's centre of mass in all steps from now on, in newtons, and a
+/// torque about it, in newton metres, both x, y, z along the world's axes, in place of those before; others
+/// stay as they are. Both are 0 at the start, and states keep them. Wakes the body where they are not what
+/// they were. Result: as of tandem_world_set_body().
 TANDEM_API tandem_status tandem_world_set_force(tandem_world* world, uint32_t body, const double* force,
                                                 const double* torque);
 

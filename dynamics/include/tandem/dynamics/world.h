@@ -70,11 +70,10 @@ class World {
   Status set_assets(std::span<const AssetView> assets);
 
   /// Places all bodies anew, at time 0. excluded: pairs that are not to meet. Result: kOk; as of
-  /// Scene::place(), and where() is the body; kOutOfRange where a velocity or gravity_scale is not finite, or a number of
-  /// the material is larger than WorldOptions may have; kNoTopology where
-  /// its mesh has none, and kNoMass where it has no extent or the density is not positive, of a moving body;
-  /// kBadOption, where where() is 0: an option is out of its range; kOutOfMemory. After an error there are no
-  /// bodies.
+  /// Scene::place(), and where() is the body; kOutOfRange where a velocity or gravity_scale is not finite, or
+  /// a number of the material is larger than WorldOptions may have; kNoTopology where its mesh has none, and
+  /// kNoMass where it has no extent or the density is not positive, of a moving body; kBadOption, where
+  /// where() is 0: an option is out of its range; kOutOfMemory. After an error there are no bodies.
   Status set_bodies(std::span<const BodyDescription> bodies, const WorldOptions& options = {},
                     std::span<const ObjectPair> excluded = {});
 
@@ -113,9 +112,10 @@ class World {
   /// kOk; kUnknownInstance; kOutOfRange where a number is not finite.
   Status push(std::uint32_t body, const double (&impulse)[3], const double (&at)[3]);
 
-  /// Sets a force that acts on a moving body's centre of mass in all steps from now on, in newtons, and a torque
-  /// about it, in newton metres, both along the world's axes, in place of those before. They are 0 at the start,
-  /// and save() keeps them. Wakes the body where they are not what they were. Result: as of push().
+  /// Sets a force that acts on a moving body's centre of mass in all steps from now on, in newtons, and a
+  /// torque about it, in newton metres, both along the world's axes, in place of those before. They are 0 at
+  /// the start, and save() keeps them. Wakes the body where they are not what they were. Result: as of
+  /// push().
   Status set_force(std::uint32_t body, const double (&force)[3], const double (&torque)[3]);
 
   /// Keeps all that the next steps depend on, and goes back to it. restore() takes what save() of this world

@@ -71,6 +71,17 @@ BodyProperties of_density(BodyProperties body, double density) {
   return body;
 }
 
+double default_slop(std::span<const AssetView> shapes, std::span<const BodyProperties> bodies) {
+  constexpr double kOfDiagonal = 1.0 / 4000, kDiagonal = 2;
+  double least = INFINITY;
+  for (const BodyProperties& body : bodies) {
+    const FileHeader& header = *shapes[body.shape].header;
+    if (body.motion == Motion::moving)
+      least = std::min(least, norm(vector_of(header.upper) - vector_of(header.lower)));
+  }
+  return kOfDiagonal * (std::isfinite(least) ? least : kDiagonal);
+}
+
 bool is_usable(const BodyState& state) {
   const Vector3& x = state.position;
   const double most = std::max({std::fabs(x.x), std::fabs(x.y), std::fabs(x.z)});

@@ -1,5 +1,6 @@
 #pragma once
 #include <cstdint>
+#include <span>
 
 #include "dynamics/mass_properties.h"
 #include "tandem/dynamics/material.h"
@@ -61,6 +62,10 @@ BodyProperties body_properties(std::uint32_t shape, const MassProperties& mesh, 
 
 /// A body of density 1, made one of another density.
 BodyProperties of_density(BodyProperties body, double density);
+
+/// Returns the overlap that a solver leaves alone unless it is told otherwise: 1/4000 of the least diagonal
+/// of a moving body's shape; without such bodies that of a shape of 2 m.
+double default_slop(std::span<const AssetView> shapes, std::span<const BodyProperties> bodies);
 
 /// Returns whether a step can start from a state: all numbers are finite, and places such as queries take.
 bool is_usable(const BodyState& state);

@@ -115,17 +115,6 @@ class Masses {
   std::vector<std::optional<BodyProperties>> of_;
 };
 
-double default_slop(std::span<const AssetView> assets, std::span<const BodyProperties> bodies) {
-  constexpr double kOfDiagonal = 1.0 / 4000;
-  double least = INFINITY;
-  for (const BodyProperties& body : bodies) {
-    const FileHeader& header = *assets[body.shape].header;
-    if (body.motion == Motion::moving)
-      least = std::min(least, norm(vector_of(header.upper) - vector_of(header.lower)));
-  }
-  return std::isfinite(least) ? kOfDiagonal * least : 5e-4;
-}
-
 }  // namespace
 
 World::World() : parts_(new (std::nothrow) Parts) {}

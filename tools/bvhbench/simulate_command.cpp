@@ -57,15 +57,17 @@ void open(Start& start, const std::vector<std::string>& paths) {
   }
 }
 
-double slop_of(const SimulateArguments& arguments, const Start& start) {
-  return arguments.slop >= 0 ? arguments.slop : default_slop(start.scene.assets[0].view());
+double slop_of(const SimulateArguments& arguments, std::span<const AssetView> shapes,
+               std::span<const BodyProperties> bodies) {
+  return arguments.slop >= 0 ? arguments.slop : default_slop(shapes, bodies);
 }
 
 void set_up_stack(const SimulateArguments& arguments, Start& start) {
   open(start, {arguments.mesh});
   const auto shapes = start.shapes();
+  const BodyProperties box[] = {{}};
   const Configuration stack = structured_stack(shapes[0], root_above(arguments.count, 3), arguments.jitter,
-                                               slop_of(arguments, start), arguments.seed);
+                                               slop_of(arguments, shapes, box), arguments.seed);
   start.bodies = prepare(stack, shapes, start.paths, arguments.density);
 }
 
@@ -224,7 +226,7 @@ ExitCode run(const char* kind, SimulateArguments arguments, const SetUp& set_up)
   SimulatorOptions& options = arguments.simulator;
   options.threads = arguments.threads();
   options.gravity = {0, 0, -arguments.gravity};
-  options.solver.slop = slop_of(arguments, start);
+  options.solver.slop = slop_of(arguments, start.shapes(), start.bodies.bodies);
   options.solver.rolling_resistance =
       arguments.rolling_resistance >= 0 ? arguments.rolling_resistance : 16 * options.solver.slop;
   options.solver.warm_start = !arguments.cold;
@@ -293,7 +295,7 @@ void add_solver_options(Command command, SimulateArguments& arguments) {
         between(0, 1e6)},
        {"--restitution", solver.restitution, "E [0]", "part of the speed that an impact gives back",
         between(0, 1)},
-       {"--slop", arguments.slop, "S [1/4000 of the first mesh's diagonal]",
+       {"--slop", arguments.slop, "S [1/4000 of a mesh's diagonal]",
         "penetration that is left alone, in metres", between(0, 1e6)},
        {"--rolling-resistance", arguments.rolling_resistance, "L [16 times the slop]",
         "lever at which the force between two bodies resists that they turn, in metres; not by sweeps",

@@ -32,8 +32,8 @@ Rest simulate(const std::string& path, const bench::LoadedScene& scene, const Si
   SimulatorOptions options;
   options.threads = settings.threads;
   options.solver.substeps = default_substeps(options.solver.method);
-  options.solver.slop = default_slop(scene.assets[0].view());
   const std::vector<AssetView> shapes = scene.views();
+  options.solver.slop = default_slop(shapes, start.bodies);
   ExcludedPairTable excluded;
   auto engine = make_engine(settings.engine);
   engine->set_filter(scene.description.filter.view(excluded));

@@ -245,10 +245,6 @@ Preparation prepare_scene(const std::string& path, const bench::LoadedScene& sce
   return all;
 }
 
-double default_slop(const AssetView& first) {
-  return 2.5e-4 * bounds_of(first).diagonal();
-}
-
 std::uint64_t hash_of(std::span<const BodyProperties> bodies, std::span<const BodyState> states,
                       const bench::LoadedScene& scene) {
   std::vector<double> numbers;

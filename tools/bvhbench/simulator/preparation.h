@@ -52,9 +52,6 @@ Preparation prepare(const Configuration& configuration, std::span<const AssetVie
 /// silent. Masses are those of the finest levels. Throws bench::FileError.
 Preparation prepare_scene(const std::string& path, const bench::LoadedScene& scene, double density);
 
-/// Penetration that a solver leaves alone unless it is told otherwise: 1/4000 of the first mesh's diagonal.
-double default_slop(const AssetView& first);
-
 /// Returns what decides a configuration's start: the hash of all instances, of the meshes, and of the scene's
 /// coarser levels.
 std::uint64_t hash_of(std::span<const BodyProperties> bodies, std::span<const BodyState> states,

@@ -44,7 +44,7 @@ struct TouchingPair {
   }
 };
 
-/// The bodies and contacts of one island in arrays, for one step: inertia, arms and directions stay those of
+/// The bodies and contacts of an island, or of several, in arrays, for one step: inertia, arms and directions stay those of
 /// its start. Bodies are known by their place here; 0 stands for all that contacts do not move, whose y is 0.
 struct IslandProblem {
   std::vector<std::uint32_t> bodies;  ///< [0] is none
@@ -85,9 +85,9 @@ struct IslandProblem {
   }
 };
 
-/// target: of the velocities along the normals. share: part of the problem's impulses that the law is asked
-/// of.
-Residual residual_of(const IslandProblem& problem, std::span<const double> target, double friction,
+/// What a contact leaves undone. target: of the velocity along the normal. share: part of the problem's impulses
+/// that the law is asked of.
+Residual residual_of(const IslandProblem& problem, std::size_t contact, double target, double friction,
                      double share);
 
 /// The bodies at the start of a step, and the impulses that its contacts start with.
@@ -96,20 +96,30 @@ struct StepStart {
   std::span<const ContactImpulse> impulses;
 };
 
-/// Bodies and contacts come by ascending layer (find_layers()), these of their lower body, so that a sweep
-/// goes up from the ground. place: for each body of the step a number that this may change.
-IslandProblem make_island_problem(const StepInput& input, std::size_t island, const StepStart& start,
-                                  const SolverOptions& options, std::span<const std::uint32_t> layers,
+/// The problem of one island. Bodies and contacts come by ascending layer (find_layers()), these of their lower
+/// body: from the ground up. place: for each body of the step a number that this may change.
+IslandProblem make_layered_problem(const StepInput& input, std::size_t island, const StepStart& start,
+                                   const SolverOptions& options, std::span<const std::uint32_t> layers,
+                                   std::span<std::uint32_t> place);
+
+/// The problem of several islands, made by all threads.
+IslandProblem make_common_problem(const StepInput& input, std::span<const std::uint32_t> islands,
+                                  const StepStart& start, const SolverOptions& options,
                                   std::span<std::uint32_t> place);
 
-/// Moves the island's bodies by the displacement, gives them the velocities, and hands out the impulses.
+/// Moves the bodies by the displacement, gives them the velocities, and hands out the impulses. threads: null for
+/// this one alone.
 void apply_solution(const IslandProblem& problem, const StepInput& input, std::span<BodyState> states,
-                    std::span<ContactImpulse> impulses);
+                    std::span<ContactImpulse> impulses, Threads* threads);
 
 /// Solves a step in substeps of length h = dt / substeps. Each: velocities by gravity and the impulses of the
 /// substep before; one sweep over soft normal rows; positions by the new velocities; two relaxing sweeps over
 /// the normal rows without their push; one over friction, within the cone of the impulse that the normal row
-/// has then, and one over rolling resistance. Restitution comes after all substeps.
+/// has then, and rolling resistance. Restitution comes after all substeps.
+///
+/// Pairs of bodies have colours, and no two of one colour move the same body: a sweep goes colour by colour, and
+/// solves those of one side by side. Velocities and impulses are float32: what the step adds to the velocities
+/// of its start.
 ///
 /// A soft row is a damped spring of frequency f = 1 / (8 h) and damping ratio 10 (2 f and 5 against what does
 /// not move), taken implicitly: it gives way to what one sweep cannot solve, and its push never becomes

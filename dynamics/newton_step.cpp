@@ -73,7 +73,7 @@ void divide_by_transposed(Matrix6& m, const Matrix6& lower) {
 }
 
 // A sparse symmetric matrix of 6 x 6 blocks: one for each body of an island and one for each two that touch,
-// and its Cholesky factors. Bodies come by ascending layer (make_island_problem()), so that the matrix is a
+// and its Cholesky factors. Bodies come by ascending layer (make_layered_problem()), so that the matrix is a
 // band, and are eliminated in this order.
 class BlockMatrix {
  public:
@@ -445,7 +445,10 @@ class NewtonStep {
     problem.impulse = std::move(impulse_.contact);
     for (std::size_t i = 0; i < problem.pairs.size(); ++i) problem.pairs[i].impulse = impulse_.turning[i];
     for (std::size_t j = 1; j < mean_.size(); ++j) problem.displacement[j] = input_.dt * mean_[j];
-    return residual_of(problem, target_, options_.friction, 1);
+    Residual out;
+    for (std::size_t i = 0; i < problem.contact_count(); ++i)
+      out.add(residual_of(problem, i, target_[i], options_.friction, 1));
+    return out;
   }
 
  private:

@@ -73,7 +73,7 @@ void divide_by_transposed(Matrix6& m, const Matrix6& lower) {
 }
 
 // A sparse symmetric matrix of 6 x 6 blocks: one for each body of an island and one for each two that touch,
-// and its Cholesky factors. Bodies come by ascending layer (make_layered_problem()), so that the matrix is a
+// and its Cholesky factors. Bodies come by ascending layer (make_island_problem()), so that the matrix is a
 // band, and are eliminated in this order.
 class BlockMatrix {
  public:

@@ -20,6 +20,7 @@ struct OneLane {
   friend OneLane operator*(float a, OneLane b) { return {a * b.v}; }
   friend OneLane operator/(OneLane a, OneLane b) { return {a.v / b.v}; }
   friend bool less(OneLane a, OneLane b) { return a.v < b.v; }
+  friend OneLane magnitude(OneLane a) { return {std::fabs(a.v)}; }
   friend OneLane square_root(OneLane a) { return {std::sqrt(a.v)}; }
   friend OneLane select(bool mask, OneLane a, OneLane b) { return mask ? a : b; }
   friend OneLane larger(OneLane a, OneLane b) { return select(less(a, b), b, a); }

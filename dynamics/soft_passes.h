@@ -215,6 +215,33 @@ class PairVisit {
     }
   }
 
+  // Finds what another visit of the rows would change.
+  TANDEM_INLINE void judge() {
+    const L none{}, inverse_h = all_of<L>(rows_.inverse_h);
+    L largest{}, squares{};
+    const auto add = [&](const L& change, const L& mass) {
+      const L size = select(less(none, mass), magnitude(change) / select(less(none, mass), mass, all_of<L>(1)), none);
+      largest = larger(largest, size);
+      squares = squares + size * size;
+    };
+    for (std::uint32_t i = 0; i < pairs_.contacts; ++i) {
+      const SoftNormal& row = normal(i);
+      const L old = take(row.impulse), rebound = take(row.rebound);
+      const auto bounces = less(none, smaller(rebound, take(row.strongest)));
+      const L bias = select(bounces, -rebound, larger(none, take(row.followed) * inverse_h));
+      add(next_impulse(row, direction(row.direction), old, bias, all_of<L>(1), none) - old, take(row.mass));
+      const SoftFriction& rubs = friction(i);
+      const L bound = take(rubs.coefficient) * old, mass = take(rubs.mass);
+      const L old1 = take(rubs.first_impulse), old2 = take(rubs.second_impulse);
+      const L wanted1 = old1 - mass * (speed(direction(rubs.first)) + take(rubs.first_drive));
+      const L wanted2 = old2 - mass * (speed(direction(rubs.second)) + take(rubs.second_drive));
+      add(within(wanted1, rest_of(bound, old2)) - old1, mass);
+      add(within(wanted2, rest_of(bound, old1)) - old2, mass);
+    }
+    put(largest, pairs_.largest_residual, lane_);
+    put(squares, pairs_.residual_squares, lane_);
+  }
+
  private:
   struct Direction {
     Vector3Of<L> along, turn_a, turn_b;
@@ -276,6 +303,12 @@ class PairVisit {
     const L one = all_of<L>(1);
     return select(less(bound, size), bound / select(less(bound, size), size, one), one);
   }
+
+  // A row of friction has what the other leaves of the cone.
+  TANDEM_INLINE static L rest_of(const L& bound, const L& other) {
+    return square_root(larger(L{}, bound * bound - other * other));
+  }
+  TANDEM_INLINE static L within(const L& x, const L& bound) { return larger(-bound, smaller(x, bound)); }
 
   TANDEM_INLINE void turn(const Vector3Of<L>& impulse) {
     spin_a_ = spin_a_ - across(pairs_.spread_a, impulse);
@@ -346,6 +379,9 @@ constexpr SoftPasses kSoftPassesOf = {
         if (rows.pairs[i].bounces)
           visit_all<L>(rows, i, i + 1, [](PairVisit<L>& visit) { visit.rebound(); });
       }
+    },
+    [](const SoftRows& rows, std::uint32_t begin, std::uint32_t end, float) {
+      visit_all<L>(rows, begin, end, [](PairVisit<L>& visit) { visit.judge(); });
     }};
 
 }  // namespace

@@ -51,6 +51,7 @@ struct SoftPairs {
   SoftNumber bias_rate, mass_scale, impulse_scale;  ///< of a soft row where bodies are too deep in each other
   SoftNumber spread_a[9], spread_b[9];              ///< turn spins into those of the world, row by row
   SoftNumber turn_drive[3], turn_mass, turn_impulse[3], lever;
+  SoftNumber largest_residual, residual_squares;
   std::uint32_t pairs;     ///< how many
   std::uint32_t first;     ///< of their normals and frictions
   std::uint32_t contacts;  ///< of the pair that has the most
@@ -76,6 +77,7 @@ struct SoftPasses {
   Pass relax;    ///< normals without what pushes bodies apart
   Pass rub;      ///< friction, and what resists turning
   Pass rebound;  ///< normals that bounce
+  Pass judge;    ///< finds what all this leaves undone
 };
 
 /// The passes by these lanes, or null where this machine or this build lacks them.

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "dynamics/island_problem.h"
+#include "dynamics/soft_step.h"
 
 namespace tandem::dynamics {
 namespace {
@@ -47,9 +48,9 @@ class IslandSolver final : public StepSolver {
       if (input.islands.contacts_of(i).empty()) {
         for (const std::uint32_t body : input.islands.bodies_of(i)) fly(input, body, states);
       } else if (wants_newton(input.islands, i, layers)) {
-        IslandProblem problem = make_layered_problem(input, i, start, options_, layers, place_);
+        IslandProblem problem = make_island_problem(input, i, start, options_, layers, place_);
         by_newton[i] = solve_newton_step(problem, input, options_);
-        if (by_newton[i]) apply_solution(problem, input, states, impulses, nullptr);
+        if (by_newton[i]) apply_solution(problem, input, states, impulses);
       }
     });
     std::vector<std::uint32_t> soft;
@@ -60,11 +61,7 @@ class IslandSolver final : public StepSolver {
       else if (!input.islands.contacts_of(i).empty())
         soft.push_back(i);
     }
-    if (!soft.empty()) {
-      IslandProblem problem = make_common_problem(input, soft, start, options_, place_);
-      all.add(solve_soft_step(problem, input, options_));
-      apply_solution(problem, input, states, impulses, &input.threads);
-    }
+    all.add(soft_.solve(input, soft, options_, states, impulses));
     for (std::uint32_t i = 0; i < states.size(); ++i) {
       if (input.bodies[i].motion == Motion::kinematic)
         advance(input.bodies[i], states[i], Vector3{}, Vector3{}, input.dt);
@@ -82,6 +79,7 @@ class IslandSolver final : public StepSolver {
 
   SolverOptions options_;
   std::vector<std::uint32_t> place_;
+  SoftSolver soft_;
 };
 
 }  // namespace

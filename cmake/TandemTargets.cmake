@@ -65,6 +65,17 @@ function(tandem_library name)
   endif()
 endfunction()
 
+# The files of variants/ are compiled for machines that have the instructions; which of these the machine has is asked at run
+# time (kernels/common/block_pair.cpp).
+macro(tandem_lane_variants name)
+  if(CMAKE_SYSTEM_PROCESSOR MATCHES "^(x86_64|AMD64|amd64)$")
+    set_source_files_properties(variants/avx2.cpp PROPERTIES COMPILE_OPTIONS "-mavx2")
+    set_source_files_properties(variants/avx512.cpp PROPERTIES
+      COMPILE_OPTIONS "-mavx512f;-mavx512vl;-mavx512dq;-mavx512bw;-mprefer-vector-width=512")
+    target_compile_definitions(tandem_${name} PRIVATE TANDEM_X86_LANES=1)
+  endif()
+endmacro()
+
 # Includes are spelled from tools/ on, such as "bvhbench/scenes/scene_file.h".
 # tandem_tool_library(scenes SOURCES a.cpp DEPENDS PUBLIC x PRIVATE y): target tandem_scenes.
 function(tandem_tool_library name)

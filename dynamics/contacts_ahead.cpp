@@ -1,6 +1,7 @@
 #include "dynamics/contacts_ahead.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace tandem::dynamics {
@@ -10,8 +11,18 @@ namespace {
 // pass by each other, a plane between them says too much about what lies ahead.
 constexpr double kFarthest = 0.25;
 
-// Bodies may fall towards each other by so many times what gravity lets a body fall in a step.
+// Bodies may fall towards each other by so many times what gravity and forces let a body fall in a step.
 constexpr double kFall = 2;
+
+// b is moved until it overlaps a by this: a length in which contacts are told well.
+double overlap_of(const BodiesAhead& of) {
+  return 0.5 * of.slop;
+}
+
+// How much nearer than by its velocity a body may come to others in a step.
+double margin_of(std::uint32_t body, const BodiesAhead& of) {
+  return kFall * of.pulls[body].most() * of.dt * of.dt + overlap_of(of);
+}
 
 bool comes_before(const ContactPoint& p, const ContactPoint& q) {
   return ObjectPair{p.body_a, p.body_b} < ObjectPair{q.body_a, q.body_b};
@@ -28,36 +39,59 @@ ContactsAhead::ContactsAhead(std::span<const AssetView> assets, std::uint32_t th
   }
 }
 
-void ContactsAhead::add_to(std::vector<ContactPoint>& found, std::span<const ObjectPair> kept,
-                           std::span<const BodyProperties> bodies, std::span<const BodyState> states,
-                           std::span<const std::uint8_t> idle, double dt, std::span<const Pull> pulls,
-                           double overlap) {
-  motion_.assign(bodies.size(), Motion::moving);
-  instances_.resize(bodies.size()), turning_.resize(bodies.size());
-  for (std::size_t i = 0; i < bodies.size(); ++i) {
-    instances_[i] = pose_of(bodies[i], states[i]);
-    if (!idle.empty() && idle[i] != 0) motion_[i] = Motion::fixed;
-    turning_[i] = motion_[i] == Motion::fixed ? 0 : bodies[i].radius * norm(states[i].angular_velocity);
+std::span<const ObjectPair> ContactsAhead::find_near(const BodiesAhead& of) {
+  place(of);
+  follow(of);
+  require(scene_.find_pairs(farthest(of)), scene_);
+  now_apart_.clear(), slow_.clear();
+  auto before = apart_.begin();
+  for (const ObjectPair& pair : scene_.pairs()) {
+    while (before != apart_.end() && before->pair < pair) ++before;
+    Apart& now = now_apart_.emplace_back(Apart{pair});
+    if (before != apart_.end() && before->pair == pair)
+      now.distance = before->distance - (way_[pair.a] + way_[pair.b]) * (1 + 1e-9);
+    const double way = of.dt * (norm(approach_of(pair, of.states)) + turning_of(pair));
+    now.reach = std::min(way + std::max(margin_of(pair.a, of), margin_of(pair.b, of)),
+                         kFarthest * std::min(of.bodies[pair.a].radius, of.bodies[pair.b].radius));
+    now.slow = way <= of.slop;
+    if (now.slow) slow_.push_back(pair);
   }
-  filter_.motion = motion_.data();
-  require(scene_.place(instances_, filter_), scene_);
-  follow(bodies, states);
-  find_pairs(found, kept, bodies, states, dt, pulls, overlap);
-  find_approaches(bodies, states, dt, pulls, overlap);
+  apart_.swap(now_apart_);
+  return slow_;
+}
+
+void ContactsAhead::add_to(std::vector<ContactPoint>& found, std::span<const ObjectPair> kept,
+                           const BodiesAhead& of) {
+  find_distances(found, kept, overlap_of(of));
+  find_approaches(of);
   if (approaches_.empty()) return;
-  find_points(bodies, states);
+  find_points(of);
   const auto middle = static_cast<std::ptrdiff_t>(found.size());
   found.insert(found.end(), points_.begin(), points_.end());
   std::inplace_merge(found.begin(), found.begin() + middle, found.end(), comes_before);
 }
 
+void ContactsAhead::place(const BodiesAhead& of) {
+  const std::size_t bodies = of.bodies.size();
+  motion_.assign(bodies, Motion::moving);
+  instances_.resize(bodies), turning_.resize(bodies);
+  for (std::size_t i = 0; i < bodies; ++i) {
+    instances_[i] = pose_of(of.bodies[i], of.states[i]);
+    if (!of.idle.empty() && of.idle[i] != 0) motion_[i] = Motion::fixed;
+    turning_[i] = motion_[i] == Motion::fixed ? 0 : of.bodies[i].radius * norm(of.states[i].angular_velocity);
+  }
+  filter_.motion = motion_.data();
+  require(scene_.place(instances_, filter_), scene_);
+}
+
 // Finds how far bodies have moved since the last call.
-void ContactsAhead::follow(std::span<const BodyProperties> bodies, std::span<const BodyState> states) {
+void ContactsAhead::follow(const BodiesAhead& of) {
+  const std::span<const BodyState> states = of.states;
   if (before_.size() != states.size()) apart_.clear(), before_.assign(states.begin(), states.end());
   way_.resize(states.size());
   for (std::size_t i = 0; i < states.size(); ++i) {
     const double turn = norm(turn_between(before_[i].orientation, states[i].orientation));
-    way_[i] = norm(states[i].position - before_[i].position) + bodies[i].radius * turn;
+    way_[i] = norm(states[i].position - before_[i].position) + of.bodies[i].radius * turn;
     before_[i] = states[i];
   }
 }
@@ -68,78 +102,84 @@ Vector3 ContactsAhead::approach_of(const ObjectPair& pair, std::span<const BodyS
          (is_still(pair.a) ? Vector3{} : states[pair.a].velocity);
 }
 
-// Finds the pairs that may come together within the step, as far as is known without looking at their
-// surfaces: pairs_. now_apart_: all pairs that are near each other.
-void ContactsAhead::find_pairs(std::span<const ContactPoint> found, std::span<const ObjectPair> kept,
-                               std::span<const BodyProperties> bodies, std::span<const BodyState> states,
-                               double dt, std::span<const Pull> pulls, double overlap) {
-  const auto margin_of = [&](std::uint32_t body) { return kFall * pulls[body].most() * dt * dt + overlap; };
-  farthest_ = 0;
-  for (std::uint32_t i = 0; i < bodies.size(); ++i) {
+// The largest reach that any pair may have.
+double ContactsAhead::farthest(const BodiesAhead& of) const {
+  double way = 0, radius = 0, margin = 0;
+  for (std::uint32_t i = 0; i < of.bodies.size(); ++i) {
     if (is_still(i)) continue;
-    const double way = dt * (norm(states[i].velocity) + turning_[i]) + margin_of(i);
-    farthest_ = std::max(farthest_, std::min(way, kFarthest * bodies[i].radius));
+    way = std::max(way, of.dt * (norm(of.states[i].velocity) + turning_[i]));
+    radius = std::max(radius, of.bodies[i].radius);
+    margin = std::max(margin, margin_of(i, of));
   }
-  farthest_ *= 2;
-  require(scene_.find_pairs(farthest_), scene_);
-  pairs_.clear(), now_apart_.clear();
-  auto contact = found.begin();
-  auto before = apart_.begin();
-  for (const ObjectPair& pair : scene_.pairs()) {
-    while (contact != found.end() && ObjectPair{contact->body_a, contact->body_b} < pair) ++contact;
-    if (contact != found.end() && ObjectPair{contact->body_a, contact->body_b} == pair) continue;
-    if (std::ranges::binary_search(kept, pair)) continue;
-    while (before != apart_.end() && before->pair < pair) ++before;
-    Apart& now = now_apart_.emplace_back(Apart{pair});
-    if (before != apart_.end() && before->pair == pair) now = *before;
-    now.distance -= (way_[pair.a] + way_[pair.b]) * (1 + 1e-9);
-    const double way = dt * (norm(approach_of(pair, states)) + turning_of(pair)) +
-                       std::max(margin_of(pair.a), margin_of(pair.b));
-    const double most = kFarthest * std::min(bodies[pair.a].radius, bodies[pair.b].radius);
-    if (now.distance > std::min(way, most)) continue;
-    pairs_.push_back(pair);
-  }
-  apart_.swap(now_apart_);
+  return std::min(2 * way + margin, kFarthest * radius);
 }
 
-void ContactsAhead::find_approaches(std::span<const BodyProperties> bodies, std::span<const BodyState> states,
-                                    double dt, std::span<const Pull> pulls, double overlap) {
+// Finds the distances of pairs that may come together within the step: asked_. They are asked about together
+// that have about the same reach, and farther than is needed now, so that most need not be asked about in the
+// next steps.
+void ContactsAhead::find_distances(std::span<const ContactPoint> found, std::span<const ObjectPair> kept,
+                                   double overlap) {
   constexpr double kExact = 0.1;  // of the overlap
+  constexpr int kClasses = 24;
+  std::array<std::vector<std::uint32_t>, kClasses> of_reach;
+  auto contact = found.begin();
+  auto known = kept.begin();
+  for (std::uint32_t i = 0; i < apart_.size(); ++i) {
+    const Apart& apart = apart_[i];
+    while (contact != found.end() && ObjectPair{contact->body_a, contact->body_b} < apart.pair) ++contact;
+    if (contact != found.end() && ObjectPair{contact->body_a, contact->body_b} == apart.pair) continue;
+    while (known != kept.end() && *known < apart.pair) ++known;
+    if (apart.slow && known != kept.end() && *known == apart.pair) continue;
+    if (apart.distance > apart.reach) continue;
+    const int exponent = std::max(std::ilogb(apart.reach / overlap), 0);
+    of_reach[static_cast<std::size_t>(std::min(exponent, kClasses - 1))].push_back(i);
+  }
+  asked_.clear();
+  for (const std::vector<std::uint32_t>& places : of_reach) {
+    if (places.empty()) continue;
+    pairs_.clear();
+    double reach = 0;
+    for (const std::uint32_t i : places)
+      pairs_.push_back(apart_[i].pair), reach = std::max(reach, apart_[i].reach);
+    const DistanceOptions options = {.tolerance = {kExact * overlap, 0.05}, .reach = 2 * reach};
+    require(distances_.find(scene_, pairs_, options), scene_);
+    for (std::size_t i = 0; i < places.size(); ++i) {
+      const ObjectDistance& distance = distances_.rows()[i];
+      apart_[places[i]].distance = distance.lower;
+      if (distance.triangle_a != kNoIndex) asked_.push_back({places[i], distance});
+    }
+  }
+  std::ranges::sort(asked_, {}, &Asked::place);
+}
+
+void ContactsAhead::find_approaches(const BodiesAhead& of) {
   approaches_.clear();
-  if (pairs_.empty()) return;
-  // Farther than is needed now, so that most need not be asked about in the next steps.
-  const DistanceOptions options = {.tolerance = {kExact * overlap, 0.05}, .reach = 2 * farthest_};
-  require(distances_.find(scene_, pairs_, options), scene_);
-  auto apart = apart_.begin();
-  for (std::size_t i = 0; i < pairs_.size(); ++i) {
-    const ObjectPair& pair = pairs_[i];
-    const ObjectDistance& distance = distances_.rows()[i];
-    while (apart->pair < pair) ++apart;
-    apart->distance = distance.lower;
-    if (distance.triangle_a == kNoIndex) continue;
+  for (const auto& [place, distance] : asked_) {
+    const ObjectPair& pair = apart_[place].pair;
     const Vector3 from_b = vector_of(distance.point_a) - vector_of(distance.point_b);
     const double gap = norm(from_b);
     if (!(gap > 0)) continue;
-    const double closing = dot(approach_of(pair, states), from_b) / gap + turning_of(pair);
-    const Pull &on_a = pulls[pair.a], &on_b = pulls[pair.b];
+    const double closing = dot(approach_of(pair, of.states), from_b) / gap + turning_of(pair);
+    const Pull &on_a = of.pulls[pair.a], &on_b = of.pulls[pair.b];
     const double pulled = std::max(std::fabs(dot(on_a.linear, from_b)), std::fabs(dot(on_b.linear, from_b)));
-    const double falls = (kFall * pulled / gap + kFall * (on_a.turning + on_b.turning)) * dt;
-    const double most = kFarthest * std::min(bodies[pair.a].radius, bodies[pair.b].radius);
-    if (gap <= std::min(most, dt * (std::max(0.0, closing) + falls) + overlap))
+    const double falls = (kFall * pulled / gap + kFall * (on_a.turning + on_b.turning)) * of.dt;
+    const double most = kFarthest * std::min(of.bodies[pair.a].radius, of.bodies[pair.b].radius);
+    const double overlap = overlap_of(of);
+    if (gap <= std::min(most, of.dt * (std::max(0.0, closing) + falls) + overlap))
       approaches_.push_back({pair, ((gap + overlap) / gap) * from_b});
   }
 }
 
-void ContactsAhead::find_points(std::span<const BodyProperties> bodies, std::span<const BodyState> states) {
+void ContactsAhead::find_points(const BodiesAhead& of) {
   constexpr double kSameWay = 0.5;  // cosine of the angle between b's way and a normal, at least
   instances_.clear(), moved_pairs_.clear();
   for (const Approach& approach : approaches_) {
     const auto first = static_cast<std::uint32_t>(instances_.size());
     moved_pairs_.push_back({first, first + 1});
-    instances_.push_back(pose_of(bodies[approach.pair.a], states[approach.pair.a]));
-    BodyState moved = states[approach.pair.b];
+    instances_.push_back(pose_of(of.bodies[approach.pair.a], of.states[approach.pair.a]));
+    BodyState moved = of.states[approach.pair.b];
     moved.position += approach.way;
-    instances_.push_back(pose_of(bodies[approach.pair.b], moved));
+    instances_.push_back(pose_of(of.bodies[approach.pair.b], moved));
   }
   require(moved_.place(instances_), moved_);
   require(contacts_.find(moved_, moved_pairs_, {}), moved_);

@@ -7,6 +7,16 @@
 
 namespace tandem::dynamics {
 
+/// Bodies before a step.
+struct BodiesAhead {
+  std::span<const BodyProperties> bodies;
+  std::span<const BodyState> states;
+  std::span<const std::uint8_t> idle;  ///< empty, or one for each body
+  double dt;
+  std::span<const Pull> pulls;  ///< of each body
+  double slop;
+};
+
 /// Finds contacts of bodies that do not touch yet but may within the step, with their gaps, so that the
 /// solver stops them where they meet, and not a step later and deep in each other.
 ///
@@ -19,33 +29,42 @@ class ContactsAhead {
   /// at. Throws QueryFailed.
   ContactsAhead(std::span<const AssetView> assets, std::uint32_t threads, const PairFilter& filter = {});
 
+  /// Finds which bodies are near each other. Result: the pairs of these whose points move against each other
+  /// by no more than the slop in this step, ascending; valid until the next call. Such a pair keeps what is
+  /// known of it until it has moved by more than that. Throws QueryFailed.
+  std::span<const ObjectPair> find_near(const BodiesAhead& of);
+
   /// Adds the contacts ahead of pairs to those found, so that these still come by ascending pair. Pairs that
-  /// have contacts, that are kept, or of two idle bodies have none. overlap: a length in which contacts are
-  /// told well. The result depends on nothing but the arguments. Throws QueryFailed.
-  void add_to(std::vector<ContactPoint>& found, std::span<const ObjectPair> kept,
-              std::span<const BodyProperties> bodies, std::span<const BodyState> states,
-              std::span<const std::uint8_t> idle, double dt, std::span<const Pull> pulls, double overlap);
+  /// have contacts, slow ones that are kept, and those of two idle bodies have none. The result depends on
+  /// nothing but the arguments. Condition: find_near() was called for the same bodies. Throws QueryFailed.
+  void add_to(std::vector<ContactPoint>& found, std::span<const ObjectPair> kept, const BodiesAhead& of);
 
  private:
   /// A pair, and how far apart its bodies are at least.
   struct Apart {
     ObjectPair pair;
     double distance = 0;
+    double reach = 0;  ///< how far apart they may be and meet within the step
+    bool slow = false;
+  };
+  /// A pair whose bodies are nearer than its reach, by place in apart_.
+  struct Asked {
+    std::size_t place;
+    ObjectDistance distance;
   };
   struct Approach {
     ObjectPair pair;
     Vector3 way;  ///< of b, until it overlaps a
   };
-  void follow(std::span<const BodyProperties> bodies, std::span<const BodyState> states);
+  void place(const BodiesAhead& of);
+  void follow(const BodiesAhead& of);
   bool is_still(std::uint32_t body) const { return motion_[body] == Motion::fixed; }
   double turning_of(const ObjectPair& pair) const { return turning_[pair.a] + turning_[pair.b]; }
   Vector3 approach_of(const ObjectPair& pair, std::span<const BodyState> states) const;
-  void find_pairs(std::span<const ContactPoint> found, std::span<const ObjectPair> kept,
-                  std::span<const BodyProperties> bodies, std::span<const BodyState> states, double dt,
-                  std::span<const Pull> pulls, double overlap);
-  void find_approaches(std::span<const BodyProperties> bodies, std::span<const BodyState> states, double dt,
-                       std::span<const Pull> pulls, double overlap);
-  void find_points(std::span<const BodyProperties> bodies, std::span<const BodyState> states);
+  double farthest(const BodiesAhead& of) const;
+  void find_distances(std::span<const ContactPoint> found, std::span<const ObjectPair> kept, double overlap);
+  void find_approaches(const BodiesAhead& of);
+  void find_points(const BodiesAhead& of);
 
   PairFilter filter_;
   Scene scene_, moved_;  // all bodies; two of each approach, moved
@@ -56,11 +75,12 @@ class ContactsAhead {
   std::vector<BodyState> before_;  // of the last call
   std::vector<double> way_;        // that points of each body have moved since then, at most
   std::vector<Apart> apart_, now_apart_;
-  double farthest_ = 0;  // reach of all pairs
+  std::vector<ObjectPair> slow_;
   std::vector<Motion> motion_;
   std::vector<double> turning_;  // how fast points of each body move by its spin, at most
   std::vector<Instance> instances_;
   std::vector<ObjectPair> pairs_, moved_pairs_;
+  std::vector<Asked> asked_;
   std::vector<Approach> approaches_;
   std::vector<ContactPoint> points_;
 };

@@ -7,25 +7,9 @@
 #include <span>
 #include <vector>
 
-#include "dynamics/step_solver.h"
+#include "dynamics/contact_rows.h"
 
 namespace tandem::dynamics {
-
-/// A direction of a contact as two gradients: w = a . y_a + b . y_b + drive. An impulse of 1 adds a to y_a
-/// and b to y_b.
-struct ContactRow {
-  Vector6 a, b;
-
-  /// Returns by how much an impulse of 1 changes w.
-  double mobility() const { return square(a) + square(b); }
-};
-
-/// Turns velocities of a body into those in which its mass is 1: y = (sqrt(m) v, F^-1 spin), where F F^T is
-/// the inverse of the inertia. Kinetic energy is |y|^2 / 2.
-struct MassScale {
-  double root_mass;
-  Matrix3 spread;  ///< F
-};
 
 /// Two bodies that touch, and how b turns against a.
 struct TouchingPair {
@@ -87,9 +71,9 @@ struct IslandProblem {
   }
 };
 
-/// target: of the velocities along the normals. share: part of the problem's impulses that the law is asked
-/// of.
-Residual residual_of(const IslandProblem& problem, std::span<const double> target, double share);
+/// What a contact leaves undone. target: of the velocity along the normal. share: part of the problem's
+/// impulses that the law is asked of.
+Residual residual_of(const IslandProblem& problem, std::size_t contact, double target, double share);
 
 /// The bodies at the start of a step, and the impulses that its contacts start with.
 struct StepStart {
@@ -97,8 +81,8 @@ struct StepStart {
   std::span<const ContactImpulse> impulses;
 };
 
-/// Bodies and contacts come by ascending layer (find_layers()), these of their lower body, so that a sweep
-/// goes up from the ground. place: for each body of the step a number that this may change.
+/// Bodies and contacts come by ascending layer (find_layers()), these of their lower
+/// body: from the ground up. place: for each body of the step a number that this may change.
 IslandProblem make_island_problem(const StepInput& input, std::size_t island, const StepStart& start,
                                   const SolverOptions& options, std::span<const std::uint32_t> layers,
                                   std::span<std::uint32_t> place);
@@ -106,18 +90,6 @@ IslandProblem make_island_problem(const StepInput& input, std::size_t island, co
 /// Moves the island's bodies by the displacement, gives them the velocities, and hands out the impulses.
 void apply_solution(const IslandProblem& problem, const StepInput& input, std::span<BodyState> states,
                     std::span<ContactImpulse> impulses);
-
-/// Solves a step in substeps of length h = dt / substeps. Each: velocities by gravity and the impulses of the
-/// substep before; one sweep over soft normal rows; positions by the new velocities; two relaxing sweeps over
-/// the normal rows without their push; one over friction, within the cone of the impulse that the normal row
-/// has then, and one over rolling resistance. Restitution comes after all substeps.
-///
-/// A soft row is a damped spring of frequency f = 1 / (8 h) and damping ratio 10 (2 f and 5 against what does
-/// not move), taken implicitly: it gives way to what one sweep cannot solve, and its push never becomes
-/// speed, because the relaxing sweeps take it back.
-///
-/// Results: velocity, displacement, impulse of the problem, and what its last substep leaves undone.
-Residual solve_soft_step(IslandProblem& problem, const StepInput& input, const SolverOptions& options);
 
 /// Solves a step of a whole island to convergence, in passes. Each finds the velocities that make the
 /// function of ConvexContacts least, with the impulses and the bounds of friction that the pass before ended

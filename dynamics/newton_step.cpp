@@ -445,7 +445,9 @@ class NewtonStep {
     problem.impulse = std::move(impulse_.contact);
     for (std::size_t i = 0; i < problem.pairs.size(); ++i) problem.pairs[i].impulse = impulse_.turning[i];
     for (std::size_t j = 1; j < mean_.size(); ++j) problem.displacement[j] = input_.dt * mean_[j];
-    return residual_of(problem, target_, 1);
+    Residual out;
+    for (std::size_t i = 0; i < problem.contact_count(); ++i) out.add(residual_of(problem, i, target_[i], 1));
+    return out;
   }
 
  private:

@@ -1,6 +1,7 @@
 #include "dynamics/simulation.h"
 
 #include <algorithm>
+#include <iterator>
 
 #include "kernels/common/stopwatch.h"
 
@@ -58,16 +59,23 @@ void Simulation::find_pulls() {
 void Simulation::find_contacts(StepRecord& record) {
   constexpr double kFall = 2;  // times what gravity lets a body fall in a step
   const std::vector<std::uint8_t> idle = this->idle();
-  const std::vector<ObjectPair> remembered = cache_.pairs();
+  const BodiesAhead ahead = {acting_, states_, idle, options_.dt, pulls_, options_.solver.slop};
+  std::vector<ObjectPair> remembered = cache_.pairs();
+  Stopwatch stopwatch;
+  if (parts_.ahead) {
+    const std::vector<ObjectPair> touching = std::move(remembered);
+    remembered.clear();
+    std::ranges::set_union(touching, parts_.ahead->find_near(ahead), std::back_inserter(remembered));
+  }
+  const double near_seconds = stopwatch.lap();
   found_ = parts_.contacts->find(poses(), idle, {remembered, options_.solver.slop});
   take(record, parts_.contacts->report());
-  Stopwatch stopwatch;
+  stopwatch.lap();
   std::vector<double> gaps;
   for (const Pull& pull : pulls_) gaps.push_back(kFall * pull.most() * options_.dt * options_.dt);
-  if (parts_.ahead)
-    parts_.ahead->add_to(found_, parts_.contacts->kept(), acting_, states_, idle, options_.dt, pulls_,
-                         0.5 * options_.solver.slop);
+  if (parts_.ahead) parts_.ahead->add_to(found_, parts_.contacts->kept(), ahead);
   cache_.update(found_, parts_.contacts->kept(), bodies_, states_, idle, gaps);
+  record.broad_phase += near_seconds;
   record.generation += stopwatch.lap();
   record.contacts = cache_.contacts().size();
   for (const ContactPoint& contact : cache_.contacts()) {

@@ -1,197 +1,324 @@
+#include "dynamics/soft_step.h"
+
 #include <algorithm>
 #include <cmath>
 
-#include "dynamics/island_problem.h"
+#include "dynamics/phases.h"
+#include "kernels/common/lane_variant.h"
 
 namespace tandem::dynamics {
 namespace {
 
-// The numbers of a soft row, where bodies are too deep in each other.
-struct Softness {
-  double bias_rate, mass_scale, impulse_scale;
+constexpr std::size_t kBodiesAtOnce = 64;  // that a thread takes
+constexpr std::uint32_t kGroupsAtOnce = 4;
+
+// Bits that look like chance, of a pair of bodies.
+std::uint32_t shuffled(std::uint32_t a, std::uint32_t b) {
+  std::uint64_t x = (std::uint64_t{a} << 32 | b) + 0x9E3779B97F4A7C15u;
+  x = (x ^ x >> 30) * 0xBF58476D1CE4E5B9u;
+  x = (x ^ x >> 27) * 0x94D049BB133111EBu;
+  return static_cast<std::uint32_t>(x >> 32);
+}
+
+void put(const Vector3& x, float (&to)[4]) {
+  to[0] = static_cast<float>(x.x), to[1] = static_cast<float>(x.y), to[2] = static_cast<float>(x.z),
+  to[3] = 0;
+}
+void put(double x, SoftNumber& to, int lane) {
+  to.of[lane] = static_cast<float>(x);
+}
+void put(const Vector3& x, SoftNumber (&to)[3], int lane) {
+  put(x.x, to[0], lane), put(x.y, to[1], lane), put(x.z, to[2], lane);
+}
+void put(const MassScale& scale, SoftNumber (&to)[9], int lane) {
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) put(at(scale.spread.row[i], j), to[3 * i + j], lane);
+  }
+}
+void put(const ContactRow& row, const Vector3& along, SoftDirection& to, int lane) {
+  put(along, to.along, lane), put(row.a.angular, to.turn_a, lane), put(row.b.angular, to.turn_b, lane);
+}
+Vector3 first_three(const float (&from)[4]) {
+  return {from[0], from[1], from[2]};
+}
+double inverse_mass(const SteppedBody& body) {
+  return body.moves ? 1 / (body.scale.root_mass * body.scale.root_mass) : 0;
+}
+
+// Bodies that impact has driven into each other may be held from both sides: what pushes one way makes the
+// other deeper, the pushes are hundreds of times their weight, and whichever point is found next throws
+// them about. So a deep contact pushes for what it is deeper than the same pair's contacts that push
+// against it. Result: by how much.
+double opposed(std::span<const ContactPoint> all, std::span<const std::uint32_t> of_pair,
+               const Vector3& normal, double separation, double slop) {
+  constexpr double kDeep = 4;  // slops
+  const double deep = kDeep * slop;
+  if (separation > -deep) return 0;
+  double opposed = 0;
+  for (const std::uint32_t other : of_pair)
+    opposed = std::max(
+        opposed, -std::min(dot(normal, all[other].normal), 0.0) * std::max(all[other].depth - slop, 0.0));
+  return std::min(opposed, -deep - separation);
+}
+
+}  // namespace
+
+struct SoftSolver::Step {
+  const StepInput& input;
+  const SolverOptions& options;
+  RowMaker rows;
+  std::span<const ContactImpulse> impulses;
+  double h = input.dt / options.substeps;
+  Softness between_movers = softness(1 / (8 * h), 10, h), against_unmoved = softness(2 / (8 * h), 5, h);
 };
 
-Softness softness(double frequency, double damping_ratio, double h) {
+SoftSolver::Softness SoftSolver::softness(double frequency, double damping_ratio, double h) {
   const double omega = 2 * kPi * frequency;
   const double a1 = 2 * damping_ratio + h * omega, a2 = h * omega * a1;
   return {omega / a1, a2 / (1 + a2), 1 / (1 + a2)};
 }
 
-class SoftStep {
- public:
-  SoftStep(IslandProblem& problem, const StepInput& input, const SolverOptions& options)
-      : p_(problem),
-        contacts_(input.contacts),
-        slop_(options.slop),
-        substeps_(options.substeps),
-        h_(input.dt / options.substeps),
-        between_movers_(softness(1 / (8 * h_), 10, h_)),
-        against_unmoved_(softness(2 / (8 * h_), 5, h_)) {}
+Residual SoftSolver::solve(const StepInput& input, std::span<const std::uint32_t> islands,
+                           const SolverOptions& options, std::span<BodyState> states,
+                           std::span<ContactImpulse> impulses) {
+  if (islands.empty()) return {};
+  const Step step = {input, options, RowMaker(input, states, options), impulses};
+  gather(step, islands);
+  group_by_colour();
+  fill(step);
+  run(step);
+  write(step, states, impulses);
+  return residual();
+}
 
-  void solve() {
-    constexpr int kRelaxingSweeps = 2;
-    const std::size_t bodies = p_.bodies.size(), contacts = p_.contact_count();
-    prepare();
-    find_opposed();
-    std::vector<Vector6> start(bodies);
-    for (std::uint32_t k = 0; k < substeps_; ++k) {
-      for (std::size_t j = 1; j < bodies; ++j) {
-        start[j] = p_.velocity[j] + h_ * p_.gravity[j];
-        p_.velocity[j] = start[j] + pushed_[j];
+// Finds the bodies, contacts and pairs of the islands.
+void SoftSolver::gather(const Step& step, std::span<const std::uint32_t> islands) {
+  const StepInput& input = step.input;
+  body_.assign(1, 0), contacts_.clear(), pairs_.clear();
+  place_.resize(input.bodies.size());
+  for (const std::uint32_t island : islands) {
+    for (const std::uint32_t body : input.islands.bodies_of(island)) {
+      place_[body] = static_cast<std::uint32_t>(body_.size());
+      body_.push_back(body);
+    }
+    const auto place = [&](std::uint32_t body) { return step.rows.is_moved(body) ? place_[body] : 0; };
+    ObjectPair last = {0, 0};
+    for (const std::uint32_t i : input.islands.contacts_of(island)) {
+      const ContactPoint& contact = input.contacts[i];
+      const ObjectPair pair = {contact.body_a, contact.body_b};
+      if (pair != last) {
+        last = pair;
+        pairs_.push_back(
+            {static_cast<std::uint32_t>(contacts_.size()), 0, place(pair.a), place(pair.b), 0, 0});
       }
-      for (std::size_t i = 0; i < contacts; ++i) visit_soft(i);
-      for (std::size_t j = 1; j < bodies; ++j) p_.displacement[j] += h_ * p_.velocity[j];
-      for (int sweep = 0; sweep < kRelaxingSweeps; ++sweep) {
-        for (std::size_t i = 0; i < contacts; ++i) relax(i, (k + 1) * h_);
-      }
-      for (std::size_t i = 0; i < contacts; ++i) visit_friction(i);
-      for (TouchingPair& pair : p_.pairs) visit_turning(pair);
-      for (std::size_t j = 1; j < bodies; ++j) pushed_[j] = p_.velocity[j] - start[j];
-    }
-    constexpr int kRestitutionSweeps = 10;
-    for (int k = 0; k < kRestitutionSweeps; ++k) {
-      for (std::size_t i = 0; i < contacts; ++i) restitute(i);
-    }
-    for (Vector3& impulse : p_.impulse) impulse = substeps_ * impulse;
-    for (TouchingPair& pair : p_.pairs) pair.impulse = substeps_ * pair.impulse;
-  }
-
-  // Condition: solve() was called.
-  Residual residual() const {
-    std::vector<double> target(p_.contact_count());
-    for (std::size_t i = 0; i < target.size(); ++i) {
-      target[i] = is_rebound(i) ? p_.rebound[i] : -std::max(0.0, followed_[i]) / h_;
-    }
-    return residual_of(p_, target, 1.0 / substeps_);
-  }
-
- private:
-  void prepare() {
-    const std::size_t contacts = p_.contact_count();
-    normal_mass_.resize(contacts), friction_mass_.resize(contacts);
-    followed_ = p_.separation;
-    strongest_.assign(contacts, 0);
-    pushed_.assign(p_.bodies.size(), Vector6{});
-    for (std::size_t i = 0; i < contacts; ++i) {
-      normal_mass_[i] = 1 / p_.normal[i].mobility();
-      friction_mass_[i] = 1 / p_.friction_mobility(i);
-      p_.impulse[i] = p_.impulse[i] / substeps_;
-      pushed_[p_.a[i]] += p_.change_of_a(i, p_.impulse[i]);
-      pushed_[p_.b[i]] += p_.change_of_b(i, p_.impulse[i]);
-    }
-    for (TouchingPair& pair : p_.pairs) {
-      pair.impulse = pair.impulse / substeps_;
-      pushed_[p_.a[pair.begin]] += pair.change_of_a(pair.impulse);
-      pushed_[p_.b[pair.begin]] += pair.change_of_b(pair.impulse);
+      contacts_.push_back(i);
+      ++pairs_.back().contacts;
     }
   }
+}
 
-  // Bodies that impact has driven into each other may be held from both sides: what pushes one way makes the
-  // other deeper, the pushes are hundreds of times their weight, and whichever point is found next throws
-  // them about. So a deep contact pushes for what it is deeper than the same pair's contacts that push
-  // against it.
-  void find_opposed() {
-    constexpr double kDeep = 4;  // slops
-    const double deep = kDeep * slop_;
-    opposed_.assign(p_.contact_count(), 0);
-    for (const TouchingPair& pair : p_.pairs) {
-      for (std::uint32_t i = pair.begin; i < pair.end; ++i) {
-        if (p_.separation[i] > -deep) continue;
-        const Vector3& normal = contacts_[p_.contacts[i]].normal;
-        double opposed = 0;
-        for (std::uint32_t j = pair.begin; j < pair.end; ++j) {
-          const double along = dot(normal, contacts_[p_.contacts[j]].normal);
-          opposed = std::max(opposed, std::min(along, 0.0) * std::min(p_.separation[j], 0.0));
-        }
-        opposed_[i] = std::min(opposed, -deep - p_.separation[i]);
-      }
+// Gives each pair a place in a group of its colour, those with many contacts first, so that few places of a
+// group are empty.
+void SoftSolver::group_by_colour() {
+  constexpr std::uint32_t kMany = 63;
+  coloured_.clear();
+  for (const Pair& pair : pairs_) {
+    const std::uint32_t few = kMany - std::min(pair.contacts, kMany);
+    coloured_.push_back({pair.a, pair.b, shuffled(body_[pair.a], body_[pair.b]) % kColouredOrders, few});
+  }
+  const std::vector<std::uint32_t> colours = find_colours(coloured_, body_.size());
+  order_ = order_by_colour(coloured_, colours);
+  groups_.clear(), group_begin_.clear(), colour_begin_.clear();
+  std::uint32_t contacts = 0;
+  for (std::uint32_t k = 0; k < order_.size(); ++k) {
+    Pair& pair = pairs_[order_[k]];
+    const bool begins = k == 0 || colours[order_[k]] != colours[order_[k - 1]];
+    if (begins) colour_begin_.push_back(static_cast<std::uint32_t>(groups_.size()));
+    if (begins || groups_.back().pairs == kSoftWidth) {
+      group_begin_.push_back(k);
+      groups_.emplace_back().first = contacts;
     }
+    SoftPairs& group = groups_.back();
+    pair.group = static_cast<std::uint32_t>(groups_.size() - 1);
+    pair.lane = static_cast<int>(group.pairs++);
+    contacts += pair.contacts > group.contacts ? pair.contacts - group.contacts : 0;
+    group.contacts = std::max(group.contacts, pair.contacts);
   }
+  colour_begin_.push_back(static_cast<std::uint32_t>(groups_.size()));
+  group_begin_.push_back(static_cast<std::uint32_t>(order_.size()));
+  normals_.resize(contacts), frictions_.resize(contacts);
+}
 
-  void add(const ContactRow& row, std::size_t i, double impulse) {
-    // A body that is not moved has a gradient of zero, so that place 0 stays 0.
-    p_.velocity[p_.a[i]] += impulse * row.a;
-    p_.velocity[p_.b[i]] += impulse * row.b;
+void SoftSolver::fill(const Step& step) {
+  // What contacts do not move has a body for each pair, so that no two write the same one.
+  auto places = static_cast<std::uint32_t>(body_.size());
+  for (SoftPairs& group : groups_) {
+    for (int lane = 0; lane < kSoftWidth; ++lane)
+      group.body_a[lane] = places++, group.body_b[lane] = places++;
   }
+  motions_.assign(places, SoftBody{});
+  bodies_.resize(body_.size()), gains_.resize(body_.size()), start_.resize(body_.size());
+  bodies_[0] = {};
+  Threads& threads = step.input.threads;
+  threads.for_parts(body_.size() - 1, kBodiesAtOnce, [&](std::size_t before) {
+    const std::size_t i = before + 1;
+    bodies_[i] = step.rows.body(body_[i]);
+    put(step.h / bodies_[i].scale.root_mass * bodies_[i].gravity.linear, gains_[i].velocity);
+    put(step.h * bodies_[i].gravity.angular, gains_[i].spin);
+  });
+  threads.for_parts(groups_.size(), kGroupsAtOnce, [&](std::size_t group) {
+    std::fill_n(normals_.begin() + groups_[group].first, groups_[group].contacts, SoftNormal{});
+    std::fill_n(frictions_.begin() + groups_[group].first, groups_[group].contacts, SoftFriction{});
+    for (std::uint32_t k = group_begin_[group]; k < group_begin_[group + 1]; ++k)
+      fill_pair(step, pairs_[order_[k]]);
+  });
+}
 
-  void visit_normal(std::size_t i, double bias, double mass_scale, double impulse_scale) {
-    const ContactRow& row = p_.normal[i];
-    const double w = p_.along(row, i, p_.velocity) + p_.drive[i].x;
-    double& impulse = p_.impulse[i].x;
-    const double wanted = impulse - normal_mass_[i] * mass_scale * (w + bias) - impulse_scale * impulse;
-    const double next = std::max(0.0, wanted);
-    add(row, i, next - impulse);
-    impulse = next;
-    strongest_[i] = std::max(strongest_[i], next);
+void SoftSolver::fill_pair(const Step& step, const Pair& pair) {
+  SoftPairs& group = groups_[pair.group];
+  const int lane = pair.lane;
+  const SteppedBody &a = bodies_[pair.a], &b = bodies_[pair.b];
+  const std::span<const std::uint32_t> contacts =
+      std::span(contacts_).subspan(pair.first_contact, pair.contacts);
+  const double substeps = step.options.substeps;
+  if (a.moves) group.body_a[lane] = pair.a, put(a.scale, group.spread_a, lane);
+  if (b.moves) group.body_b[lane] = pair.b, put(b.scale, group.spread_b, lane);
+  put(inverse_mass(a), group.inverse_mass_a, lane), put(inverse_mass(b), group.inverse_mass_b, lane);
+  const Softness& soft = a.moves && b.moves ? step.between_movers : step.against_unmoved;
+  put(soft.bias_rate, group.bias_rate, lane), put(soft.mass_scale, group.mass_scale, lane);
+  put(soft.impulse_scale, group.impulse_scale, lane);
+  const Vector3 turns = b.scale.spread * b.velocity.angular - a.scale.spread * a.velocity.angular;
+  put(turns + step.rows.turning_drive(step.input.contacts[contacts[0]]), group.turn_drive, lane);
+  put(1 / turning_mobility(a, b), group.turn_mass, lane);
+  put(step.rows.material_of(step.input.contacts[contacts[0]]).rolling_resistance, group.lever, lane);
+  Vector3 turning;
+  for (const std::uint32_t i : contacts) turning += step.impulses[i].turning;
+  put(turning / substeps, group.turn_impulse, lane);
+  step.rows.add_contacts(contacts, a, b, step.impulses, [&](std::size_t i, const ContactRows& rows) {
+    SoftNormal& normal = normals_[group.first + i];
+    const Vector3& along = step.input.contacts[contacts[i]].normal;
+    put(rows.normal, along, normal.direction, lane);
+    put(1 / rows.normal.mobility(), normal.mass, lane);
+    put(rows.drive.x + rows.speed(rows.normal, a.velocity, b.velocity), normal.drive, lane);
+    put(rows.separation, normal.separation, lane), put(rows.separation, normal.followed, lane);
+    put(opposed(step.input.contacts, contacts, along, rows.separation, step.options.slop), normal.opposed,
+        lane);
+    put(rows.rebound, normal.rebound, lane);
+    put(rows.impulse.x / substeps, normal.impulse, lane);
+    if (rows.rebound > 0) group.bounces = true;
+    SoftFriction& friction = frictions_[group.first + i];
+    put(rows.first, rows.first_direction, friction.first, lane);
+    put(rows.second, rows.second_direction, friction.second, lane);
+    put(1 / rows.friction_mobility(), friction.mass, lane);
+    put(rows.friction, friction.coefficient, lane);
+    put(rows.drive.y + rows.speed(rows.first, a.velocity, b.velocity), friction.first_drive, lane);
+    put(rows.drive.z + rows.speed(rows.second, a.velocity, b.velocity), friction.second_drive, lane);
+    put(rows.impulse.y / substeps, friction.first_impulse, lane);
+    put(rows.impulse.z / substeps, friction.second_impulse, lane);
+  });
+}
+
+void SoftSolver::run(const Step& step) {
+  constexpr int kRelaxingSweeps = 2, kRestitutionSweeps = 10;
+  struct Phase {
+    Work work;
+    std::uint32_t colour = 0;
+    SoftPasses::Pass pass = nullptr;
+    float time = 0;
+  };
+  std::vector<Phase> phases;
+  std::vector<std::uint32_t> parts;
+  const auto body_parts = static_cast<std::uint32_t>((body_.size() + kBodiesAtOnce - 1) / kBodiesAtOnce);
+  const auto add_bodies = [&](Work work) { phases.push_back({work}), parts.push_back(body_parts); };
+  const auto add_sweep = [&](SoftPasses::Pass pass, double time = 0) {
+    for (std::uint32_t c = 0; c + 1 < colour_begin_.size(); ++c) {
+      phases.push_back({Work::pass, c, pass, static_cast<float>(time)});
+      parts.push_back((colour_begin_[c + 1] - colour_begin_[c] + kGroupsAtOnce - 1) / kGroupsAtOnce);
+    }
+  };
+  static const SoftPasses& passes = *best_way<const SoftPasses*>(soft_passes);
+  add_sweep(passes.start);
+  for (std::uint32_t k = 0; k < step.options.substeps; ++k) {
+    add_bodies(k == 0 ? Work::begin : Work::accelerate);
+    add_sweep(passes.push);
+    add_bodies(Work::move);
+    add_sweep(passes.follow, (k + 1) * step.h);
+    for (int sweep = 1; sweep < kRelaxingSweeps; ++sweep) add_sweep(passes.relax);
+    add_sweep(passes.rub);
   }
-
-  void visit_soft(std::size_t i) {
-    constexpr double kFastestPush = 3;  // m/s
-    if (followed_[i] > 0) return visit_normal(i, followed_[i] / h_, 1, 0);
-    const double s = std::min(0.0, followed_[i] + opposed_[i]);
-    const Softness& soft = p_.a[i] == 0 || p_.b[i] == 0 ? against_unmoved_ : between_movers_;
-    visit_normal(i, std::max(soft.bias_rate * s, -kFastestPush), soft.mass_scale, soft.impulse_scale);
+  if (std::ranges::any_of(groups_, &SoftPairs::bounces)) {
+    for (int sweep = 0; sweep < kRestitutionSweeps; ++sweep) add_sweep(passes.rebound);
   }
+  add_sweep(passes.judge);
+  const SoftRows rows = {motions_.data(), groups_.data(), normals_.data(), frictions_.data(),
+                         static_cast<float>(1 / step.h)};
+  run_phases(step.input.threads, parts, [&](std::size_t i, std::uint32_t part) {
+    const Phase& phase = phases[i];
+    if (phase.work == Work::pass) {
+      const std::uint32_t begin = colour_begin_[phase.colour] + part * kGroupsAtOnce;
+      phase.pass(rows, begin, std::min(begin + kGroupsAtOnce, colour_begin_[phase.colour + 1]), phase.time);
+      return;
+    }
+    const std::size_t begin = part * kBodiesAtOnce;
+    for (std::size_t j = begin; j < std::min(begin + kBodiesAtOnce, body_.size()); ++j)
+      visit_body(j, phase.work, static_cast<float>(step.h));
+  });
+}
 
-  void relax(std::size_t i, double time) {
-    const double s = p_.separation[i] + p_.along(p_.normal[i], i, p_.displacement) + time * p_.drive[i].x;
-    followed_[i] = s;
-    visit_normal(i, std::max(0.0, s / h_), 1, 0);
+// The contacts of a substep begin with what they added to the velocities in the one before.
+void SoftSolver::visit_body(std::size_t i, Work work, float h) {
+  const auto visit = [&](float gain, float& start, float& velocity, float& moved) {
+    if (work == Work::move) {
+      moved += h * velocity;
+      return;
+    }
+    const float pushed = work == Work::begin ? velocity : velocity - start;
+    start = (work == Work::begin ? 0 : velocity) + gain;
+    velocity = start + pushed;
+  };
+  SoftBody& motion = motions_[i];
+  for (int k = 0; k < 3; ++k) {
+    visit(gains_[i].velocity[k], start_[i].velocity[k], motion.velocity[k], motion.moved[k]);
+    visit(gains_[i].spin[k], start_[i].spin[k], motion.spin[k], motion.turned[k]);
   }
+}
 
-  void visit_friction(std::size_t i) {
-    Vector3& impulse = p_.impulse[i];
-    const double bound = p_.friction[i] * impulse.x;
-    const double w1 = p_.along(p_.first[i], i, p_.velocity) + p_.drive[i].y;
-    const double w2 = p_.along(p_.second[i], i, p_.velocity) + p_.drive[i].z;
-    double next1 = impulse.y - friction_mass_[i] * w1, next2 = impulse.z - friction_mass_[i] * w2;
-    const double size = std::sqrt(next1 * next1 + next2 * next2);
-    if (size > bound) next1 *= bound / size, next2 *= bound / size;
-    const double change1 = next1 - impulse.y, change2 = next2 - impulse.z;
-    p_.velocity[p_.a[i]] += change1 * p_.first[i].a + change2 * p_.second[i].a;
-    p_.velocity[p_.b[i]] += change1 * p_.first[i].b + change2 * p_.second[i].b;
-    impulse.y = next1, impulse.z = next2;
+void SoftSolver::write(const Step& step, std::span<BodyState> states,
+                       std::span<ContactImpulse> impulses) const {
+  step.input.threads.for_parts(body_.size() - 1, kBodiesAtOnce, [&](std::size_t before) {
+    const std::size_t i = before + 1;
+    const SoftBody& motion = motions_[i];
+    const SteppedBody& body = bodies_[i];
+    Vector6 velocity = body.velocity, displacement = step.input.dt * body.velocity;
+    velocity += {body.scale.root_mass * first_three(motion.velocity), first_three(motion.spin)};
+    displacement += {body.scale.root_mass * first_three(motion.moved), first_three(motion.turned)};
+    apply_motion(step.input.bodies[body_[i]], body.scale, velocity, displacement, step.input.dt,
+                 states[body_[i]]);
+  });
+  const double substeps = step.options.substeps;
+  step.input.threads.for_parts(pairs_.size(), kBodiesAtOnce, [&](std::size_t k) {
+    const Pair& pair = pairs_[k];
+    const SoftNumber(&turns)[3] = groups_[pair.group].turn_impulse;
+    const Vector3 turning = {turns[0].of[pair.lane], turns[1].of[pair.lane], turns[2].of[pair.lane]};
+    for (std::uint32_t i = 0; i < pair.contacts; ++i) {
+      const std::uint32_t contact = contacts_[pair.first_contact + i], row = groups_[pair.group].first + i;
+      const auto [first, second] = Tangents(step.input.contacts[contact].normal);
+      const double along_first = frictions_[row].first_impulse.of[pair.lane],
+                   along_second = frictions_[row].second_impulse.of[pair.lane];
+      impulses[contact] = {substeps * normals_[row].impulse.of[pair.lane],
+                           substeps * (along_first * first + along_second * second),
+                           substeps / pair.contacts * turning};
+    }
+  });
+}
+
+Residual SoftSolver::residual() const {
+  Residual out;
+  for (const SoftPairs& group : groups_) {
+    for (std::uint32_t lane = 0; lane < group.pairs; ++lane)
+      out.add(Residual{group.largest_residual.of[lane], group.residual_squares.of[lane]});
   }
-
-  void visit_turning(TouchingPair& pair) {
-    double push = 0;
-    for (std::uint32_t contact = pair.begin; contact < pair.end; ++contact) push += p_.impulse[contact].x;
-    const double bound = pair.rolling_resistance * push;
-    const Vector3 turning = p_.turning(pair, p_.velocity) + pair.drive;
-    Vector3 next = pair.impulse - turning / pair.mobility;
-    const double size = norm(next);
-    if (size > bound) next = (bound / size) * next;
-    const Vector3 change = next - pair.impulse;
-    p_.velocity[p_.a[pair.begin]] += pair.change_of_a(change);
-    p_.velocity[p_.b[pair.begin]] += pair.change_of_b(change);
-    pair.impulse = next;
-  }
-
-  bool is_rebound(std::size_t i) const { return p_.rebound[i] > 0 && strongest_[i] > 0; }
-
-  void restitute(std::size_t i) {
-    if (is_rebound(i)) visit_normal(i, -p_.rebound[i], 1, 0);
-  }
-
-  IslandProblem& p_;
-  std::span<const ContactPoint> contacts_;
-  double slop_;
-  std::uint32_t substeps_;
-  double h_;
-  Softness between_movers_, against_unmoved_;
-  std::vector<double> normal_mass_, friction_mass_;
-  std::vector<double> followed_;   // separations as they change
-  std::vector<double> opposed_;    // by how much depth the push is less
-  std::vector<double> strongest_;  // largest impulse along the normal
-  std::vector<Vector6> pushed_;    // what the contacts of a substep have added to the velocities
-};
-
-}  // namespace
-
-Residual solve_soft_step(IslandProblem& problem, const StepInput& input, const SolverOptions& options) {
-  SoftStep step(problem, input, options);
-  step.solve();
-  return step.residual();
+  return out;
 }
 
 }  // namespace tandem::dynamics

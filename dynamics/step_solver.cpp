@@ -1,10 +1,10 @@
 #include "dynamics/step_solver.h"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 
 #include "dynamics/island_problem.h"
+#include "dynamics/soft_step.h"
 
 namespace tandem::dynamics {
 namespace {
@@ -34,7 +34,8 @@ bool is_slender(const Islands& islands, std::size_t island, std::span<const std:
   return work <= kForAContact * static_cast<double>(islands.contacts_of(island).size());
 }
 
-// Solves islands by themselves; bodies that no contact holds fly.
+// Solves islands by Newton's method each by itself, and all others together; bodies that no contact holds
+// fly.
 class IslandSolver final : public StepSolver {
  public:
   explicit IslandSolver(const SolverOptions& options) : options_(options) {}
@@ -43,26 +44,33 @@ class IslandSolver final : public StepSolver {
             std::span<ContactImpulse> impulses) override {
     place_.resize(input.bodies.size());
     const std::vector<std::uint32_t> layers = find_layers(input.bodies, input.contacts);
-    std::vector<Residual> residuals(input.islands.size());
-    std::atomic<std::uint64_t> by_newton = 0;
+    const StepStart start = {states, impulses};
+    std::vector<std::optional<Residual>> by_newton(input.islands.size());
     input.threads.for_each(input.islands.size(), [&](std::size_t i) {
       if (input.islands.contacts_of(i).empty()) {
         for (const std::uint32_t body : input.islands.bodies_of(i)) fly(input, body, states);
-        return;
+      } else if (wants_newton(input.islands, i, layers)) {
+        IslandProblem problem = make_island_problem(input, i, start, options_, layers, place_);
+        by_newton[i] = solve_newton_step(problem, input, options_);
+        if (by_newton[i]) apply_solution(problem, input, states, impulses);
       }
-      IslandProblem problem = make_island_problem(input, i, {states, impulses}, options_, layers, place_);
-      std::optional<Residual> newton;
-      if (wants_newton(input.islands, i, layers)) newton = solve_newton_step(problem, input, options_);
-      by_newton += newton ? 1 : 0;
-      residuals[i] = newton ? *newton : solve_soft_step(problem, input, options_);
-      apply_solution(problem, input, states, impulses);
     });
+    std::vector<std::uint32_t> soft;
+    Residual all;
+    for (std::uint32_t i = 0; i < input.islands.size(); ++i) {
+      if (by_newton[i])
+        all.add(*by_newton[i]);
+      else if (!input.islands.contacts_of(i).empty())
+        soft.push_back(i);
+    }
+    all.add(soft_.solve(input, soft, options_, states, impulses));
     for (std::uint32_t i = 0; i < states.size(); ++i) {
       if (input.bodies[i].motion == Motion::kinematic)
         advance(input.bodies[i], states[i], Vector3{}, Vector3{}, input.dt);
     }
-    sum_up(input.islands, residuals);
-    statistics_.newton_islands = by_newton;
+    sum_up(input.islands, all);
+    statistics_.newton_islands = static_cast<std::uint64_t>(
+        std::ranges::count_if(by_newton, [](const auto& of) { return of.has_value(); }));
   }
 
  private:
@@ -73,6 +81,7 @@ class IslandSolver final : public StepSolver {
 
   SolverOptions options_;
   std::vector<std::uint32_t> place_;
+  SoftSolver soft_;
 };
 
 }  // namespace
@@ -89,17 +98,14 @@ Material mixed_material(const BodyProperties& a, const BodyProperties& b, const 
           larger(&Material::rolling_resistance, options.rolling_resistance)};
 }
 
-void StepSolver::sum_up(const Islands& islands, std::span<const Residual> residuals) {
+void StepSolver::sum_up(const Islands& islands, const Residual& residual) {
   statistics_ = {};
-  for (std::size_t i = 0; i < residuals.size(); ++i) {
+  for (std::size_t i = 0; i < islands.size(); ++i)
     statistics_.islands += islands.contacts_of(i).empty() ? 0 : 1;
-    statistics_.residual = std::max(statistics_.residual, residuals[i].largest);
-    statistics_.residual_rms += residuals[i].squares;
-  }
   statistics_.contacts = islands.contacts.size();
   if (statistics_.contacts == 0) return;
-  statistics_.residual_rms =
-      std::sqrt(statistics_.residual_rms / (3 * static_cast<double>(statistics_.contacts)));
+  statistics_.residual = residual.largest;
+  statistics_.residual_rms = std::sqrt(residual.squares / (3 * static_cast<double>(statistics_.contacts)));
 }
 
 std::unique_ptr<StepSolver> make_step_solver(const SolverOptions& options) {

@@ -72,6 +72,10 @@ struct Residual {
     largest = std::max(largest, row);
     squares += row * row;
   }
+  void add(const Residual& other) {
+    largest = std::max(largest, other.largest);
+    squares += other.squares;
+  }
 };
 
 /// Moves bodies through a step under gravity and contacts. The bytes are the same for any number of threads.
@@ -88,8 +92,8 @@ class StepSolver {
   const SolverStatistics& statistics() const { return statistics_; }
 
  protected:
-  /// Makes the statistics of a step, but for newton_islands. residuals: of each island.
-  void sum_up(const Islands& islands, std::span<const Residual> residuals);
+  /// Makes the statistics of a step, but for newton_islands. residual: of all islands.
+  void sum_up(const Islands& islands, const Residual& residual);
 
   SolverStatistics statistics_;
 };

@@ -20,9 +20,15 @@ class Threads {
   /// Calls part(i) for each i below count, in no order, on any of the threads. Throws what a part threw.
   template <typename Part>
   void for_each(std::size_t count, const Part& part) {
+    for_parts(count, 1, part);
+  }
+
+  /// for_each() for parts that are small: a thread takes `grain` at once.
+  template <typename Part>
+  void for_parts(std::size_t count, std::size_t grain, const Part& part) {
     std::exception_ptr thrown;
     std::mutex mutex;
-    workers_.for_parts(count_, count, 1, [&](std::size_t begin, std::size_t end, std::uint32_t) {
+    workers_.for_parts(count_, count, grain, [&](std::size_t begin, std::size_t end, std::uint32_t) {
       try {
         for (std::size_t i = begin; i < end; ++i) part(i);
       } catch (...) {
@@ -31,6 +37,15 @@ class Threads {
       }
     });
     if (thrown) std::rethrow_exception(thrown);
+  }
+
+  /// Calls work() on this thread, and on others that come before it has returned there. It must return only
+  /// when nothing is left to begin, and not throw.
+  template <typename Work>
+  void on_each(const Work& work) {
+    workers_.run(
+        count_, [](void* context, std::uint32_t) { (*static_cast<const Work*>(context))(); },
+        const_cast<Work*>(&work));
   }
 
  private:

@@ -84,6 +84,7 @@ struct LaneMask<16> {
 
 template <int kCount>
 struct Lanes {
+  static constexpr int kLanes = kCount;
   using Floats = typename Vector<kCount>::Floats;
   using Bits = typename Vector<kCount>::Bits;
   Floats v;

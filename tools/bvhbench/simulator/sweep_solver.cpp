@@ -353,7 +353,9 @@ class SweepSolver final : public StepSolver {
       if (!part.islands.contacts_of(i).empty())
         residuals[i] = solve_island(part, part.islands.contacts_of(i), options, impulses, layers);
     });
-    sum_up(part.islands, residuals);
+    Residual all;
+    for (const Residual& residual : residuals) all.add(residual);
+    sum_up(part.islands, all);
     hand_out(part, states, impulses);
   }
 

@@ -1,0 +1,107 @@
+#include "dynamics/contact_rows.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace tandem::dynamics {
+namespace {
+
+Vector6 scaled(const MassScale& scale, const Vector3& velocity, const Vector3& spin) {
+  return {scale.root_mass * velocity, inverse(scale.spread) * spin};
+}
+
+Vector6 gradient(const SteppedBody& body, const Vector3& direction, const Vector3& arm) {
+  if (!body.moves) return {};
+  return {direction / body.scale.root_mass, transposed(body.scale.spread) * cross(arm, direction)};
+}
+
+}  // namespace
+
+SteppedBody RowMaker::body(std::uint32_t body) const {
+  const BodyState& state = states_[body];
+  SteppedBody out;
+  out.moves = true;
+  out.scale = {std::sqrt(input_.bodies[body].mass),
+               matrix_of(state.orientation) * cholesky(input_.bodies[body].inverse_inertia)};
+  out.velocity = scaled(out.scale, state.velocity, state.angular_velocity);
+  out.gravity = scaled(out.scale, input_.pulls[body].linear, input_.pulls[body].angular);
+  return out;
+}
+
+// The contacts of a patch are those of a pair that have the same normal.
+bool RowMaker::is_of_patch(std::uint32_t first, std::uint32_t contact) const {
+  return square(input_.contacts[contact].normal - input_.contacts[first].normal) < 1e-12;
+}
+
+// A gap may close; what is in contact comes no deeper, or bodies would rock within the slop. But where a
+// patch is round, a body that rolls brings the points before it down: they may go on as they turn, and
+// faster. What turns too slowly for that rests.
+double RowMaker::separation_of(const ContactPoint& contact, const ContactPoint& deepest) const {
+  constexpr double kRound = 0.7, kOfSlop = 0.25, kFaster = 4, kLeast = 0.3;
+  const double separation = contact.depth < 0 ? -contact.depth : std::min(0.0, options_.slop - contact.depth);
+  const double lower = deepest.depth - contact.depth;
+  if (lower < kRound * std::max(deepest.depth, kOfSlop * options_.slop)) return separation;
+  const Vector3 spin = states_[contact.body_b].angular_velocity - states_[contact.body_a].angular_velocity;
+  const double rises = dot(contact.normal, cross(spin, contact.position - deepest.position));
+  const double allowed = -kFaster * input_.dt * rises;
+  return allowed > kLeast * options_.slop ? separation + allowed : separation;
+}
+
+// The velocity of a body's point if contacts do not move the body, else 0.
+Vector3 RowMaker::driven(std::uint32_t body, const Vector3& arm) const {
+  if (input_.bodies[body].motion != Motion::kinematic) return Vector3{};
+  return states_[body].velocity + cross(states_[body].angular_velocity, arm);
+}
+
+Vector3 RowMaker::spin_driven(std::uint32_t body) const {
+  if (input_.bodies[body].motion != Motion::kinematic) return Vector3{};
+  return states_[body].angular_velocity;
+}
+
+ContactRows RowMaker::rows(const ContactPoint& contact, const ContactPoint& deepest, const SteppedBody& a,
+                           const SteppedBody& b, const Material& material,
+                           const ContactImpulse& impulse) const {
+  constexpr double kBouncesAbove = 2;  // times what gravity and forces give in a step
+  const Vector3& normal = contact.normal;
+  const auto [first, second] = Tangents(normal);
+  const Vector3 arm_a = contact.position - states_[contact.body_a].position,
+                arm_b = contact.position - states_[contact.body_b].position;
+  const auto row = [&](const Vector3& direction) {
+    return ContactRow{-gradient(a, direction, arm_a), gradient(b, direction, arm_b)};
+  };
+  ContactRows out = {row(normal), row(first), row(second), first, second, {}, 0, material.friction, 0, {}};
+  const Vector3 moving = driven(contact.body_b, arm_b) - driven(contact.body_a, arm_a);
+  out.drive = {dot(normal, moving), dot(first, moving), dot(second, moving)};
+  out.separation = separation_of(contact, deepest);
+  const double gap = std::max(0.0, -contact.depth);
+  const double approach = -out.speed(out.normal, a.velocity, b.velocity) - out.drive.x;
+  const double fall = -out.speed(out.normal, a.gravity, b.gravity);
+  const double square_at_impact = approach * approach + 2 * fall * gap;
+  const bool meets = gap < input_.dt * (approach + 0.5 * input_.dt * fall) || gap == 0;
+  const bool bounces = meets && approach > kBouncesAbove * input_.dt * input_.pull_of(contact);
+  out.rebound = bounces ? material.restitution * std::sqrt(std::max(0.0, square_at_impact)) : 0;
+  out.impulse = {impulse.normal, dot(first, impulse.tangential), dot(second, impulse.tangential)};
+  return out;
+}
+
+double turning_mobility(const SteppedBody& a, const SteppedBody& b) {
+  Matrix3 mobility;
+  for (const SteppedBody* body : {&a, &b}) {
+    if (body->moves) mobility = mobility + body->scale.spread * transposed(body->scale.spread);
+  }
+  double most = 0;
+  for (const Vector3& row : mobility.row)
+    most = std::max(most, std::fabs(row.x) + std::fabs(row.y) + std::fabs(row.z));
+  return most;
+}
+
+void apply_motion(const BodyProperties& body, const MassScale& scale, const Vector6& velocity,
+                  const Vector6& displacement, double dt, BodyState& state) {
+  state.velocity = velocity.linear / scale.root_mass;
+  state.angular_velocity = scale.spread * velocity.angular;
+  const Vector3 moved = displacement.linear / (scale.root_mass * dt);
+  const Vector3 turned = scale.spread * displacement.angular / dt;
+  advance(body, state, moved - state.velocity, turned - state.angular_velocity, dt);
+}
+
+}  // namespace tandem::dynamics

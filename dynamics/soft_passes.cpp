@@ -1,0 +1,55 @@
+#include "dynamics/soft_passes.h"
+
+#include <cmath>
+
+#include "kernels/common/lane_variant.h"
+
+namespace tandem::dynamics {
+namespace {
+
+// One float32 with the operations of Lanes.
+struct OneLane {
+  static constexpr int kLanes = 1;
+  float v;
+
+  friend OneLane operator+(OneLane a, OneLane b) { return {a.v + b.v}; }
+  friend OneLane operator+(OneLane a, float b) { return {a.v + b}; }
+  friend OneLane operator-(OneLane a, OneLane b) { return {a.v - b.v}; }
+  friend OneLane operator-(OneLane a) { return {-a.v}; }
+  friend OneLane operator*(OneLane a, OneLane b) { return {a.v * b.v}; }
+  friend OneLane operator*(float a, OneLane b) { return {a * b.v}; }
+  friend OneLane operator/(OneLane a, OneLane b) { return {a.v / b.v}; }
+  friend bool less(OneLane a, OneLane b) { return a.v < b.v; }
+  friend OneLane magnitude(OneLane a) { return {std::fabs(a.v)}; }
+  friend OneLane square_root(OneLane a) { return {std::sqrt(a.v)}; }
+  friend OneLane select(bool mask, OneLane a, OneLane b) { return mask ? a : b; }
+  friend OneLane larger(OneLane a, OneLane b) { return select(less(a, b), b, a); }
+  friend Vector3Of<OneLane> gathered(const float* const* rows, OneLane) {
+    return {{rows[0][0]}, {rows[0][1]}, {rows[0][2]}};
+  }
+  friend void scatter(const Vector3Of<OneLane>& p, float* const* rows) {
+    rows[0][0] = p.x.v, rows[0][1] = p.y.v, rows[0][2] = p.z.v;
+  }
+};
+
+constexpr SoftPasses kScalar = kSoftPassesOf<OneLane>;
+
+// The passes of the lanes that the walk of two trees takes on this machine.
+const SoftPasses* passes_of(const LaneVariant* lanes) {
+#ifdef TANDEM_HAVE_LANES
+  if (lanes == &kLanes4) return &kSoftLanes4;
+#ifdef TANDEM_X86_LANES
+  if (lanes == &kAvx2) return &kSoftAvx2;
+  if (lanes == &kAvx512) return &kSoftAvx512;
+#endif
+#endif
+  return nullptr;
+}
+
+}  // namespace
+
+const SoftPasses* soft_passes(BlockPairVariant variant) {
+  return variant == BlockPairVariant::scalar ? &kScalar : passes_of(lane_variant(variant));
+}
+
+}  // namespace tandem::dynamics

@@ -1,0 +1,389 @@
+#pragma once
+#include <cstring>
+
+#include "dynamics/soft_rows.h"
+#include "kernels/common/lanes.h"
+
+#ifndef TANDEM_INLINE
+#define TANDEM_INLINE inline
+#endif
+
+// The passes of a soft step by L: OneLane of soft_passes.cpp, or Lanes of a kind. As lanes.h, this is
+// included by files that are compiled for different machines: all of it has internal linkage.
+namespace tandem::dynamics {
+namespace {
+
+constexpr float kFastestPush = 3;  // m/s
+
+template <typename L>
+TANDEM_INLINE L all_of(float x) {
+  return L{} + x;
+}
+
+template <typename L>
+TANDEM_INLINE L taken(const SoftNumber& from, int lane) {
+  L out;
+  std::memcpy(&out.v, from.of + lane, sizeof out.v);
+  return out;
+}
+
+template <typename L>
+TANDEM_INLINE void put(const L& x, SoftNumber& to, int lane) {
+  std::memcpy(to.of + lane, &x.v, sizeof x.v);
+}
+
+template <typename L>
+TANDEM_INLINE L smaller(const L& a, const L& b) {
+  return select(less(b, a), b, a);
+}
+
+template <typename L>
+struct Vector3Of {
+  L x, y, z;
+
+  TANDEM_INLINE friend Vector3Of operator+(const Vector3Of& p, const Vector3Of& q) {
+    return {p.x + q.x, p.y + q.y, p.z + q.z};
+  }
+  TANDEM_INLINE friend Vector3Of operator-(const Vector3Of& p, const Vector3Of& q) {
+    return {p.x - q.x, p.y - q.y, p.z - q.z};
+  }
+  TANDEM_INLINE friend Vector3Of operator*(const L& s, const Vector3Of& p) {
+    return {s * p.x, s * p.y, s * p.z};
+  }
+  TANDEM_INLINE friend L dot(const Vector3Of& p, const Vector3Of& q) {
+    return p.x * q.x + p.y * q.y + p.z * q.z;
+  }
+};
+
+template <typename L>
+TANDEM_INLINE Vector3Of<L> taken(const SoftNumber (&from)[3], int lane) {
+  return {taken<L>(from[0], lane), taken<L>(from[1], lane), taken<L>(from[2], lane)};
+}
+
+// gathered(): the first three numbers of a row of each lane. scatter() writes them back.
+#ifdef TANDEM_HAVE_LANES
+TANDEM_INLINE Vector3Of<Lanes4> gathered(const float* const* rows, Lanes4) {
+  Lanes4 four[4] = {load(rows[0]), load(rows[1]), load(rows[2]), load(rows[3])};
+  transpose(four);
+  return {four[0], four[1], four[2]};
+}
+TANDEM_INLINE void scatter(const Vector3Of<Lanes4>& p, float* const* rows) {
+  Lanes4 four[4] = {p.x, p.y, p.z, Lanes4{}};
+  transpose(four);
+  for (int i = 0; i < 4; ++i) std::memcpy(rows[i], &four[i].v, sizeof four[i].v);
+}
+
+TANDEM_INLINE Lanes<8> joined(const Lanes<4>& low, const Lanes<4>& high) {
+  return {__builtin_shufflevector(low.v, high.v, 0, 1, 2, 3, 4, 5, 6, 7)};
+}
+TANDEM_INLINE Lanes<16> joined(const Lanes<8>& low, const Lanes<8>& high) {
+  return {__builtin_shufflevector(low.v, high.v, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15)};
+}
+TANDEM_INLINE Lanes<4> low_half(const Lanes<8>& x) {
+  return {__builtin_shufflevector(x.v, x.v, 0, 1, 2, 3)};
+}
+TANDEM_INLINE Lanes<4> high_half(const Lanes<8>& x) {
+  return {__builtin_shufflevector(x.v, x.v, 4, 5, 6, 7)};
+}
+TANDEM_INLINE Lanes<8> low_half(const Lanes<16>& x) {
+  return {__builtin_shufflevector(x.v, x.v, 0, 1, 2, 3, 4, 5, 6, 7)};
+}
+TANDEM_INLINE Lanes<8> high_half(const Lanes<16>& x) {
+  return {__builtin_shufflevector(x.v, x.v, 8, 9, 10, 11, 12, 13, 14, 15)};
+}
+
+template <int kCount>
+TANDEM_INLINE Vector3Of<Lanes<kCount>> gathered(const float* const* rows, Lanes<kCount>) {
+  const auto low = gathered(rows, Lanes<kCount / 2>{}),
+             high = gathered(rows + kCount / 2, Lanes<kCount / 2>{});
+  return {joined(low.x, high.x), joined(low.y, high.y), joined(low.z, high.z)};
+}
+template <int kCount>
+TANDEM_INLINE void scatter(const Vector3Of<Lanes<kCount>>& p, float* const* rows) {
+  using Half = Vector3Of<Lanes<kCount / 2>>;
+  scatter(Half{low_half(p.x), low_half(p.y), low_half(p.z)}, rows);
+  scatter(Half{high_half(p.x), high_half(p.y), high_half(p.z)}, rows + kCount / 2);
+}
+#endif
+
+template <typename L>
+TANDEM_INLINE Vector3Of<L> gathered(const SoftRows& rows, const std::uint32_t* bodies,
+                                    float (SoftBody::*what)[4]) {
+  const float* places[L::kLanes];
+  for (int i = 0; i < L::kLanes; ++i) places[i] = rows.bodies[bodies[i]].*what;
+  return gathered(places, L{});
+}
+
+template <typename L>
+TANDEM_INLINE void scatter(const Vector3Of<L>& p, const SoftRows& rows, const std::uint32_t* bodies,
+                           float (SoftBody::*what)[4]) {
+  float* places[L::kLanes];
+  for (int i = 0; i < L::kLanes; ++i) places[i] = rows.bodies[bodies[i]].*what;
+  scatter(p, places);
+}
+
+// The bodies of as many pairs as there are lanes, from `lane` on.
+template <typename L>
+class PairVisit {
+ public:
+  TANDEM_INLINE PairVisit(const SoftRows& rows, SoftPairs& pairs, int lane)
+      : rows_(rows),
+        pairs_(pairs),
+        lane_(lane),
+        velocity_a_(gathered<L>(rows, pairs.body_a + lane, &SoftBody::velocity)),
+        velocity_b_(gathered<L>(rows, pairs.body_b + lane, &SoftBody::velocity)),
+        spin_a_(gathered<L>(rows, pairs.body_a + lane, &SoftBody::spin)),
+        spin_b_(gathered<L>(rows, pairs.body_b + lane, &SoftBody::spin)),
+        inverse_mass_a_(taken<L>(pairs.inverse_mass_a, lane)),
+        inverse_mass_b_(taken<L>(pairs.inverse_mass_b, lane)) {}
+
+  TANDEM_INLINE void write() const {
+    scatter(velocity_a_, rows_, pairs_.body_a + lane_, &SoftBody::velocity);
+    scatter(velocity_b_, rows_, pairs_.body_b + lane_, &SoftBody::velocity);
+    scatter(spin_a_, rows_, pairs_.body_a + lane_, &SoftBody::spin);
+    scatter(spin_b_, rows_, pairs_.body_b + lane_, &SoftBody::spin);
+  }
+
+  TANDEM_INLINE void start() {
+    for (std::uint32_t i = 0; i < pairs_.contacts; ++i) {
+      push(direction(normal(i).direction), take(normal(i).impulse));
+      SoftFriction& row = friction(i);
+      push(direction(row.first), take(row.first_impulse));
+      push(direction(row.second), take(row.second_impulse));
+    }
+    turn({take(pairs_.turn_impulse[0]), take(pairs_.turn_impulse[1]), take(pairs_.turn_impulse[2])});
+  }
+
+  TANDEM_INLINE void push_apart() {
+    const L none{}, one = all_of<L>(1), inverse_h = all_of<L>(rows_.inverse_h);
+    const L fastest = all_of<L>(-kFastestPush);
+    const L bias_rate = take(pairs_.bias_rate), mass_scale = take(pairs_.mass_scale),
+            impulse_scale = take(pairs_.impulse_scale);
+    for (std::uint32_t i = 0; i < pairs_.contacts; ++i) {
+      SoftNormal& row = normal(i);
+      const L followed = take(row.followed);
+      const L deep = smaller(none, followed + take(row.opposed));
+      const auto is_gap = less(none, followed);
+      const L bias = select(is_gap, followed * inverse_h, larger(bias_rate * deep, fastest));
+      visit(row, bias, select(is_gap, one, mass_scale), select(is_gap, none, impulse_scale));
+    }
+  }
+
+  // Condition: `moved` and `turned` of the bodies are those of this time.
+  TANDEM_INLINE void follow(float time) {
+    const auto moved = gathered<L>(rows_, pairs_.body_b + lane_, &SoftBody::moved) -
+                       gathered<L>(rows_, pairs_.body_a + lane_, &SoftBody::moved);
+    const auto turned_a = gathered<L>(rows_, pairs_.body_a + lane_, &SoftBody::turned),
+               turned_b = gathered<L>(rows_, pairs_.body_b + lane_, &SoftBody::turned);
+    for (std::uint32_t i = 0; i < pairs_.contacts; ++i) {
+      SoftNormal& row = normal(i);
+      const Direction along = direction(row.direction);
+      const L change = dot(along.along, moved) + dot(along.turn_a, turned_a) + dot(along.turn_b, turned_b);
+      put(take(row.separation) + change + time * take(row.drive), row.followed, lane_);
+    }
+  }
+
+  TANDEM_INLINE void relax() {
+    const L none{}, one = all_of<L>(1), inverse_h = all_of<L>(rows_.inverse_h);
+    for (std::uint32_t i = 0; i < pairs_.contacts; ++i) {
+      SoftNormal& row = normal(i);
+      visit(row, larger(none, take(row.followed) * inverse_h), one, none);
+    }
+  }
+
+  TANDEM_INLINE void rub() {
+    L all{};
+    for (std::uint32_t i = 0; i < pairs_.contacts; ++i) {
+      const L push = take(normal(i).impulse);
+      all = all + push;
+      rub(friction(i), push);
+    }
+    resist_turning(all);
+  }
+
+  TANDEM_INLINE void rebound() {
+    const L none{}, one = all_of<L>(1);
+    for (std::uint32_t i = 0; i < pairs_.contacts; ++i) {
+      SoftNormal& row = normal(i);
+      const L wanted = take(row.rebound);
+      const L old = take(row.impulse);
+      const Direction along = direction(row.direction);
+      const L next = next_impulse(row, along, old, -wanted, one, none);
+      const L change =
+          select(less(none, wanted), select(less(none, take(row.strongest)), next - old, none), none);
+      push(along, change);
+      put(old + change, row.impulse, lane_);
+    }
+  }
+
+  // Finds what another visit of the rows would change.
+  TANDEM_INLINE void judge() {
+    const L none{}, inverse_h = all_of<L>(rows_.inverse_h);
+    L largest{}, squares{};
+    const auto add = [&](const L& change, const L& mass) {
+      const L size =
+          select(less(none, mass), magnitude(change) / select(less(none, mass), mass, all_of<L>(1)), none);
+      largest = larger(largest, size);
+      squares = squares + size * size;
+    };
+    for (std::uint32_t i = 0; i < pairs_.contacts; ++i) {
+      const SoftNormal& row = normal(i);
+      const L old = take(row.impulse), rebound = take(row.rebound);
+      const auto bounces = less(none, smaller(rebound, take(row.strongest)));
+      const L bias = select(bounces, -rebound, larger(none, take(row.followed) * inverse_h));
+      add(next_impulse(row, direction(row.direction), old, bias, all_of<L>(1), none) - old, take(row.mass));
+      const SoftFriction& rubs = friction(i);
+      const L bound = take(rubs.coefficient) * old, mass = take(rubs.mass);
+      const L old1 = take(rubs.first_impulse), old2 = take(rubs.second_impulse);
+      const L wanted1 = old1 - mass * (speed(direction(rubs.first)) + take(rubs.first_drive));
+      const L wanted2 = old2 - mass * (speed(direction(rubs.second)) + take(rubs.second_drive));
+      add(within(wanted1, rest_of(bound, old2)) - old1, mass);
+      add(within(wanted2, rest_of(bound, old1)) - old2, mass);
+    }
+    put(largest, pairs_.largest_residual, lane_);
+    put(squares, pairs_.residual_squares, lane_);
+  }
+
+ private:
+  struct Direction {
+    Vector3Of<L> along, turn_a, turn_b;
+  };
+
+  TANDEM_INLINE L take(const SoftNumber& from) const { return taken<L>(from, lane_); }
+  TANDEM_INLINE Direction direction(const SoftDirection& from) const {
+    return {taken<L>(from.along, lane_), taken<L>(from.turn_a, lane_), taken<L>(from.turn_b, lane_)};
+  }
+  TANDEM_INLINE SoftNormal& normal(std::uint32_t contact) const {
+    return rows_.normals[pairs_.first + contact];
+  }
+  TANDEM_INLINE SoftFriction& friction(std::uint32_t contact) const {
+    return rows_.frictions[pairs_.first + contact];
+  }
+
+  TANDEM_INLINE L speed(const Direction& d) const {
+    return dot(d.along, velocity_b_ - velocity_a_) + dot(d.turn_a, spin_a_) + dot(d.turn_b, spin_b_);
+  }
+  TANDEM_INLINE void push(const Direction& d, const L& impulse) {
+    velocity_a_ = velocity_a_ - (impulse * inverse_mass_a_) * d.along;
+    velocity_b_ = velocity_b_ + (impulse * inverse_mass_b_) * d.along;
+    spin_a_ = spin_a_ + impulse * d.turn_a;
+    spin_b_ = spin_b_ + impulse * d.turn_b;
+  }
+
+  TANDEM_INLINE L next_impulse(const SoftNormal& row, const Direction& along, const L& impulse, const L& bias,
+                               const L& mass_scale, const L& impulse_scale) const {
+    const L w = speed(along) + take(row.drive);
+    const L wanted = impulse - take(row.mass) * mass_scale * (w + bias) - impulse_scale * impulse;
+    return larger(L{}, wanted);
+  }
+  TANDEM_INLINE void visit(SoftNormal& row, const L& bias, const L& mass_scale, const L& impulse_scale) {
+    const L impulse = take(row.impulse);
+    const Direction along = direction(row.direction);
+    const L next = next_impulse(row, along, impulse, bias, mass_scale, impulse_scale);
+    push(along, next - impulse);
+    put(next, row.impulse, lane_);
+    put(larger(take(row.strongest), next), row.strongest, lane_);
+  }
+
+  TANDEM_INLINE void rub(SoftFriction& row, const L& push_of_normal) {
+    const L bound = take(row.coefficient) * push_of_normal, mass = take(row.mass);
+    const Direction first = direction(row.first), second = direction(row.second);
+    const L old1 = take(row.first_impulse), old2 = take(row.second_impulse);
+    L next1 = old1 - mass * (speed(first) + take(row.first_drive));
+    L next2 = old2 - mass * (speed(second) + take(row.second_drive));
+    const L size = square_root(next1 * next1 + next2 * next2);
+    const L part = shortening(size, bound);
+    next1 = part * next1, next2 = part * next2;
+    push(first, next1 - old1);
+    push(second, next2 - old2);
+    put(next1, row.first_impulse, lane_);
+    put(next2, row.second_impulse, lane_);
+  }
+
+  // Makes what is longer than the bound as long as it.
+  TANDEM_INLINE static L shortening(const L& size, const L& bound) {
+    const L one = all_of<L>(1);
+    return select(less(bound, size), bound / select(less(bound, size), size, one), one);
+  }
+
+  // A row of friction has what the other leaves of the cone.
+  TANDEM_INLINE static L rest_of(const L& bound, const L& other) {
+    return square_root(larger(L{}, bound * bound - other * other));
+  }
+  TANDEM_INLINE static L within(const L& x, const L& bound) { return larger(-bound, smaller(x, bound)); }
+
+  TANDEM_INLINE void turn(const Vector3Of<L>& impulse) {
+    spin_a_ = spin_a_ - across(pairs_.spread_a, impulse);
+    spin_b_ = spin_b_ + across(pairs_.spread_b, impulse);
+  }
+  TANDEM_INLINE Vector3Of<L> row(const SoftNumber* matrix, int i) const {
+    return {take(matrix[3 * i]), take(matrix[3 * i + 1]), take(matrix[3 * i + 2])};
+  }
+  TANDEM_INLINE Vector3Of<L> across(const SoftNumber* matrix, const Vector3Of<L>& p) const {
+    return p.x * row(matrix, 0) + p.y * row(matrix, 1) + p.z * row(matrix, 2);
+  }
+  TANDEM_INLINE Vector3Of<L> applied(const SoftNumber* matrix, const Vector3Of<L>& p) const {
+    return {dot(row(matrix, 0), p), dot(row(matrix, 1), p), dot(row(matrix, 2), p)};
+  }
+
+  TANDEM_INLINE void resist_turning(const L& push_of_normals) {
+    const L bound = take(pairs_.lever) * push_of_normals, mass = take(pairs_.turn_mass);
+    const Vector3Of<L> turning = applied(pairs_.spread_b, spin_b_) - applied(pairs_.spread_a, spin_a_) +
+                                 taken<L>(pairs_.turn_drive, lane_);
+    const Vector3Of<L> old = taken<L>(pairs_.turn_impulse, lane_);
+    Vector3Of<L> next = old - mass * turning;
+    next = shortening(square_root(dot(next, next)), bound) * next;
+    turn(next - old);
+    put(next.x, pairs_.turn_impulse[0], lane_);
+    put(next.y, pairs_.turn_impulse[1], lane_);
+    put(next.z, pairs_.turn_impulse[2], lane_);
+  }
+
+  const SoftRows& rows_;
+  SoftPairs& pairs_;
+  int lane_;
+  Vector3Of<L> velocity_a_, velocity_b_, spin_a_, spin_b_;
+  L inverse_mass_a_, inverse_mass_b_;
+};
+
+template <typename L, typename Visit>
+TANDEM_INLINE void visit_all(const SoftRows& rows, std::uint32_t begin, std::uint32_t end,
+                             const Visit& visit) {
+  for (std::uint32_t i = begin; i < end; ++i) {
+    SoftPairs& pairs = rows.pairs[i];
+    for (int lane = 0; lane < static_cast<int>(pairs.pairs); lane += L::kLanes) {
+      PairVisit<L> bodies(rows, pairs, lane);
+      visit(bodies);
+      bodies.write();
+    }
+  }
+}
+
+template <typename L>
+constexpr SoftPasses kSoftPassesOf = {
+    [](const SoftRows& rows, std::uint32_t begin, std::uint32_t end, float) {
+      visit_all<L>(rows, begin, end, [](PairVisit<L>& visit) { visit.start(); });
+    },
+    [](const SoftRows& rows, std::uint32_t begin, std::uint32_t end, float) {
+      visit_all<L>(rows, begin, end, [](PairVisit<L>& visit) { visit.push_apart(); });
+    },
+    [](const SoftRows& rows, std::uint32_t begin, std::uint32_t end, float time) {
+      visit_all<L>(rows, begin, end, [&](PairVisit<L>& visit) { visit.follow(time), visit.relax(); });
+    },
+    [](const SoftRows& rows, std::uint32_t begin, std::uint32_t end, float) {
+      visit_all<L>(rows, begin, end, [](PairVisit<L>& visit) { visit.relax(); });
+    },
+    [](const SoftRows& rows, std::uint32_t begin, std::uint32_t end, float) {
+      visit_all<L>(rows, begin, end, [](PairVisit<L>& visit) { visit.rub(); });
+    },
+    [](const SoftRows& rows, std::uint32_t begin, std::uint32_t end, float) {
+      for (std::uint32_t i = begin; i < end; ++i) {
+        if (rows.pairs[i].bounces) visit_all<L>(rows, i, i + 1, [](PairVisit<L>& visit) { visit.rebound(); });
+      }
+    },
+    [](const SoftRows& rows, std::uint32_t begin, std::uint32_t end, float) {
+      visit_all<L>(rows, begin, end, [](PairVisit<L>& visit) { visit.judge(); });
+    }};
+
+}  // namespace
+}  // namespace tandem::dynamics

@@ -1,0 +1,89 @@
+#pragma once
+#include <cstdint>
+
+#include "kernels/common/block_pair.h"
+
+namespace tandem::dynamics {
+
+/// Pairs of bodies that a soft step solves side by side: no two of them move the same body, so that the
+/// result does not depend on how many a machine takes at once.
+inline constexpr int kSoftWidth = 16;
+
+/// A number of each pair.
+struct alignas(64) SoftNumber {
+  float of[kSoftWidth];
+};
+
+/// A body in a soft step: its velocity, its spin in coordinates in which its inertia is 1, and what these
+/// have come to since the step began. The last of each four is 0.
+struct alignas(64) SoftBody {
+  float velocity[4], spin[4], moved[4], turned[4];
+};
+
+/// A direction of a contact: its velocity is along . (velocity_b - velocity_a) + turn_a . spin_a + turn_b .
+/// spin_b.
+struct SoftDirection {
+  SoftNumber along[3], turn_a[3], turn_b[3];
+};
+
+/// The normals of one contact of each pair.
+struct SoftNormal {
+  SoftDirection direction;
+  SoftNumber mass;  ///< 0 where a pair has no such contact
+  SoftNumber drive, separation, rebound;
+  SoftNumber opposed;   ///< by how much depth the push is less
+  SoftNumber followed;  ///< the separation as it changes
+  SoftNumber impulse, strongest;
+};
+
+/// Their friction.
+struct SoftFriction {
+  SoftDirection first, second;
+  SoftNumber mass, coefficient;
+  SoftNumber first_drive, second_drive, first_impulse, second_impulse;
+};
+
+/// Up to kSoftWidth pairs of one colour.
+struct SoftPairs {
+  std::uint32_t body_a[kSoftWidth], body_b[kSoftWidth];  ///< what contacts do not move has a body of its own,
+                                                         ///< of no inverse mass, for each pair
+  SoftNumber inverse_mass_a, inverse_mass_b;
+  SoftNumber bias_rate, mass_scale, impulse_scale;  ///< of a soft row where bodies are too deep in each other
+  SoftNumber spread_a[9], spread_b[9];              ///< turn spins into those of the world, row by row
+  SoftNumber turn_drive[3], turn_mass, turn_impulse[3], lever;
+  SoftNumber largest_residual, residual_squares;
+  std::uint32_t pairs;     ///< how many
+  std::uint32_t first;     ///< of their normals and frictions
+  std::uint32_t contacts;  ///< of the pair that has the most
+  bool bounces;            ///< a rebound is more than 0
+};
+
+/// All that the passes of a soft step read and write.
+struct SoftRows {
+  SoftBody* bodies;
+  SoftPairs* pairs;
+  SoftNormal* normals;
+  SoftFriction* frictions;
+  float inverse_h;  ///< of the seconds of a substep
+};
+
+/// Visits of the SoftPairs from begin to end, all of one colour, `time` seconds after the step began. Every
+/// variant gives the same bytes.
+struct SoftPasses {
+  using Pass = void (*)(const SoftRows& rows, std::uint32_t begin, std::uint32_t end, float time);
+  Pass start;    ///< adds the impulses to the velocities
+  Pass push;     ///< soft normals
+  Pass follow;   ///< finds the separations where the bodies are now, and does what `relax` does
+  Pass relax;    ///< normals without what pushes bodies apart
+  Pass rub;      ///< friction, and what resists turning
+  Pass rebound;  ///< normals that bounce
+  Pass judge;    ///< finds what all this leaves undone
+};
+
+/// The passes by these lanes, or null where this machine or this build lacks them.
+const SoftPasses* soft_passes(BlockPairVariant variant);
+
+// Each is defined in a file of dynamics/variants/.
+extern const SoftPasses kSoftLanes4, kSoftAvx2, kSoftAvx512;
+
+}  // namespace tandem::dynamics

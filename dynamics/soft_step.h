@@ -1,0 +1,78 @@
+#pragma once
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "dynamics/contact_rows.h"
+#include "dynamics/pair_colours.h"
+#include "dynamics/soft_rows.h"
+
+namespace tandem::dynamics {
+
+/// Solves a step in substeps of length h = dt / substeps. Each: velocities by gravity, lasting forces and the
+/// impulses of the substep before; one sweep over soft normal rows; positions by the new velocities; two
+/// relaxing sweeps over the normal rows without their push; one over friction, within the cone of the impulse
+/// that the normal row has then, and rolling resistance. Restitution comes after all substeps.
+///
+/// A soft row is a damped spring of frequency f = 1 / (8 h) and damping ratio 10 (2 f and 5 against what does
+/// not move), taken implicitly: it gives way to what one sweep cannot solve, and its push never becomes
+/// speed, because the relaxing sweeps take it back.
+///
+/// Pairs of bodies have colours, and no two of one colour move the same body: a sweep goes colour by colour,
+/// and solves the pairs of a colour side by side. Impulses and velocities are float32, these less those at
+/// the start of the step.
+class SoftSolver {
+ public:
+  /// Solves the contacts of islands together. states: those at the start of the step, and then at its end.
+  /// impulses: those of all contacts, to start with and then the solution. Result: what the last substep
+  /// leaves undone.
+  Residual solve(const StepInput& input, std::span<const std::uint32_t> islands, const SolverOptions& options,
+                 std::span<BodyState> states, std::span<ContactImpulse> impulses);
+
+ private:
+  /// The contacts of two bodies, these by place in bodies_, and where their rows are.
+  struct Pair {
+    std::uint32_t first_contact, contacts;  ///< in contacts_
+    std::uint32_t a, b;
+    std::uint32_t group;
+    int lane;
+  };
+  /// The numbers of a soft row, where bodies are too deep in each other.
+  struct Softness {
+    double bias_rate, mass_scale, impulse_scale;
+  };
+  /// Velocities of a body, as SoftBody has them.
+  struct Velocities {
+    float velocity[4], spin[4];
+  };
+  enum class Work : std::uint8_t { pass, begin, accelerate, move };
+  struct Step;
+
+  static Softness softness(double frequency, double damping_ratio, double h);
+  void gather(const Step& step, std::span<const std::uint32_t> islands);
+  void group_by_colour();
+  void fill(const Step& step);
+  void fill_pair(const Step& step, const Pair& pair);
+  void run(const Step& step);
+  void visit_body(std::size_t body, Work work, float h);
+  void write(const Step& step, std::span<BodyState> states, std::span<ContactImpulse> impulses) const;
+  Residual residual() const;
+
+  // Kept from step to step for their memory alone. The first of bodies stands for all that contacts do not
+  // move.
+  std::vector<std::uint32_t> body_, place_;  // of each place, and of each body of the step
+  std::vector<SteppedBody> bodies_;
+  std::vector<std::uint32_t> contacts_;
+  std::vector<Pair> pairs_;
+  std::vector<ColouredPair> coloured_;
+  std::vector<std::uint32_t> order_;         // of pairs, group by group
+  std::vector<std::uint32_t> group_begin_;   // in order_
+  std::vector<std::uint32_t> colour_begin_;  // of its groups
+  std::vector<SoftPairs> groups_;
+  std::vector<SoftNormal> normals_;
+  std::vector<SoftFriction> frictions_;
+  std::vector<SoftBody> motions_;          // what the step adds to the motion of its start
+  std::vector<Velocities> gains_, start_;  // what a substep adds to each; the velocities without its contacts
+};
+
+}  // namespace tandem::dynamics

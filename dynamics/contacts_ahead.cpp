@@ -11,14 +11,6 @@ namespace {
 // pass by each other, a plane between them says too much about what lies ahead.
 constexpr double kFarthest = 0.25;
 
-// Bodies may fall towards each other by so many times what gravity lets a body fall in a step.
-constexpr double kFall = 2;
-
-// b is moved until it overlaps a by this: a length in which contacts are told well.
-double overlap_of(const BodiesAhead& of) {
-  return 0.5 * of.slop;
-}
-
 bool comes_before(const ContactPoint& p, const ContactPoint& q) {
   return ObjectPair{p.body_a, p.body_b} < ObjectPair{q.body_a, q.body_b};
 }
@@ -37,7 +29,7 @@ ContactsAhead::ContactsAhead(std::span<const AssetView> assets, std::uint32_t th
 std::span<const ObjectPair> ContactsAhead::find_near(const BodiesAhead& of) {
   place(of);
   follow(of);
-  const double margin = this->margin(of);
+  const double margin = of.fall() + of.overlap();
   require(scene_.find_pairs(farthest(of)), scene_);
   now_apart_.clear(), slow_.clear();
   auto before = apart_.begin();
@@ -57,7 +49,7 @@ std::span<const ObjectPair> ContactsAhead::find_near(const BodiesAhead& of) {
 
 void ContactsAhead::add_to(std::vector<ContactPoint>& found, std::span<const ObjectPair> kept,
                            const BodiesAhead& of) {
-  find_distances(found, kept, overlap_of(of));
+  find_distances(found, kept, of.overlap());
   find_approaches(of);
   if (approaches_.empty()) return;
   find_points(of);
@@ -72,7 +64,7 @@ void ContactsAhead::place(const BodiesAhead& of) {
   instances_.resize(bodies), turning_.resize(bodies);
   for (std::size_t i = 0; i < bodies; ++i) {
     instances_[i] = pose_of(of.bodies[i], of.states[i]);
-    if (!of.idle.empty() && of.idle[i] != 0) motion_[i] = Motion::fixed;
+    if (of.is_idle(static_cast<std::uint32_t>(i))) motion_[i] = Motion::fixed;
     turning_[i] = motion_[i] == Motion::fixed ? 0 : of.bodies[i].radius * norm(of.states[i].angular_velocity);
   }
   filter_.motion = motion_.data();
@@ -97,10 +89,6 @@ Vector3 ContactsAhead::approach_of(const ObjectPair& pair, std::span<const BodyS
          (is_still(pair.a) ? Vector3{} : states[pair.a].velocity);
 }
 
-double ContactsAhead::margin(const BodiesAhead& of) const {
-  return kFall * norm(of.gravity) * of.dt * of.dt + overlap_of(of);
-}
-
 // The largest reach that any pair may have.
 double ContactsAhead::farthest(const BodiesAhead& of) const {
   double way = 0, radius = 0;
@@ -109,7 +97,7 @@ double ContactsAhead::farthest(const BodiesAhead& of) const {
     way = std::max(way, of.dt * (norm(of.states[i].velocity) + turning_[i]));
     radius = std::max(radius, of.bodies[i].radius);
   }
-  return std::min(2 * way + margin(of), kFarthest * radius);
+  return std::min(2 * way + of.fall() + of.overlap(), kFarthest * radius);
 }
 
 // Finds the distances of pairs that may come together within the step: asked_. They are asked about together
@@ -158,10 +146,9 @@ void ContactsAhead::find_approaches(const BodiesAhead& of) {
     const double gap = norm(from_b);
     if (!(gap > 0)) continue;
     const double closing = dot(approach_of(pair, of.states), from_b) / gap + turning_of(pair);
-    const double falls = kFall * std::fabs(dot(of.gravity, from_b)) / gap * of.dt;
     const double most = kFarthest * std::min(of.bodies[pair.a].radius, of.bodies[pair.b].radius);
-    const double overlap = overlap_of(of);
-    if (gap <= std::min(most, of.dt * (std::max(0.0, closing) + falls) + overlap))
+    const double overlap = of.overlap();
+    if (gap <= std::min(most, of.dt * std::max(0.0, closing) + of.fall_along(from_b / gap) + overlap))
       approaches_.push_back({pair, ((gap + overlap) / gap) * from_b});
   }
 }

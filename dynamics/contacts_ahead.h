@@ -2,20 +2,11 @@
 #include <span>
 #include <vector>
 
+#include "dynamics/bodies_ahead.h"
 #include "dynamics/contact_finder.h"
 #include "tandem/kernels/distance_query.h"
 
 namespace tandem::dynamics {
-
-/// Bodies before a step.
-struct BodiesAhead {
-  std::span<const BodyProperties> bodies;
-  std::span<const BodyState> states;
-  std::span<const std::uint8_t> idle;  ///< empty, or one for each body
-  double dt;
-  Vector3 gravity;
-  double slop;
-};
 
 /// Finds contacts of bodies that do not touch yet but may within the step, with their gaps, so that the
 /// solver stops them where they meet, and not a step later and deep in each other.
@@ -61,7 +52,6 @@ class ContactsAhead {
   bool is_still(std::uint32_t body) const { return motion_[body] == Motion::fixed; }
   double turning_of(const ObjectPair& pair) const { return turning_[pair.a] + turning_[pair.b]; }
   Vector3 approach_of(const ObjectPair& pair, std::span<const BodyState> states) const;
-  double margin(const BodiesAhead& of) const;
   double farthest(const BodiesAhead& of) const;
   void find_distances(std::span<const ContactPoint> found, std::span<const ObjectPair> kept, double overlap);
   void find_approaches(const BodiesAhead& of);

@@ -50,7 +50,6 @@ StepRecord Simulation::step() {
 }
 
 void Simulation::find_contacts(StepRecord& record) {
-  constexpr double kFall = 2;  // times what gravity lets a body fall in a step
   const std::vector<std::uint8_t> idle = this->idle();
   const BodiesAhead ahead = {acting_, states_, idle, options_.dt, options_.gravity, options_.solver.slop};
   std::vector<ObjectPair> remembered = cache_.pairs();
@@ -64,9 +63,8 @@ void Simulation::find_contacts(StepRecord& record) {
   found_ = parts_.contacts->find(poses(), idle, {remembered, options_.solver.slop});
   take(record, parts_.contacts->report());
   stopwatch.lap();
-  const double gap = kFall * norm(options_.gravity) * options_.dt * options_.dt;
   if (parts_.ahead) parts_.ahead->add_to(found_, parts_.contacts->kept(), ahead);
-  cache_.update(found_, parts_.contacts->kept(), bodies_, states_, idle, gap);
+  cache_.update(found_, parts_.contacts->kept(), ahead);
   record.broad_phase += near_seconds;
   record.generation += stopwatch.lap();
   record.contacts = cache_.contacts().size();

@@ -34,7 +34,8 @@ struct BoxOnSlab {
       poses.push_back(pose_of(bodies[i], states[i]));
       radii.push_back(bodies[i].radius);
     }
-    cache.update(found, judge.kept(pairs, poses, radii, kReach), bodies, states, idle, kGap);
+    const double g = 9.81, dt = std::sqrt(kGap / (2 * g));
+    cache.update(found, judge.kept(pairs, poses, radii, kReach), {bodies, states, idle, dt, {0, 0, -g}, kReach});
     return {cache.contacts().begin(), cache.contacts().end()};
   }
 

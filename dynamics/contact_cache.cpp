@@ -118,8 +118,7 @@ std::vector<ObjectPair> ContactCache::pairs() const {
 }
 
 void ContactCache::update(std::span<const ContactPoint> found, std::span<const ObjectPair> kept,
-                          std::span<const BodyProperties> bodies, std::span<const BodyState> states,
-                          std::span<const std::uint8_t> idle, std::span<const double> gaps) {
+                          const BodiesAhead& of) {
   const std::vector<CachedContact> before = std::move(entries_);
   is_cold_ = before.empty();
   entries_.clear(), contacts_.clear(), place_.clear();
@@ -131,29 +130,36 @@ void ContactCache::update(std::span<const ContactPoint> found, std::span<const O
     const auto old = head_of(rest, pair);
     const auto fresh = head_of(found, pair);
     rest = rest.subspan(old.size()), found = found.subspan(fresh.size());
-    if (!idle.empty() && idle[pair.a] && idle[pair.b]) {
+    if (of.is_idle(pair.a) && of.is_idle(pair.b)) {
       entries_.insert(entries_.end(), old.begin(), old.end());
       continue;
     }
-    if (std::binary_search(kept.begin(), kept.end(), pair)) {
-      for (const CachedContact& entry : old) add(entry, moved_with_bodies(entry, states));
-    } else {
-      renew(old, fresh, states, std::max(gaps[pair.a], gaps[pair.b]), smaller_radius(pair, bodies));
+    while (!kept.empty() && kept.front() < pair) kept = kept.subspan(1);
+    if (kept.empty() || kept.front() != pair) {
+      renew(old, fresh, of, smaller_radius(pair, of.bodies));
+      continue;
+    }
+    for (const CachedContact& entry : old) {
+      const ContactPoint moved = moved_with_bodies(entry, of.states);
+      if (of.is_far(moved))
+        entries_.push_back(entry);
+      else
+        add(entry, moved);
     }
   }
 }
 
 void ContactCache::renew(std::span<const CachedContact> old, std::span<const ContactPoint> found,
-                         std::span<const BodyState> states, double gap, double radius) {
+                         const BodiesAhead& of, double radius) {
   constexpr double kNear = 0.02, kMatches = 0.1;  // of the smaller body's radius
   const double near = kNear * radius;
   const std::size_t first = entries_.size(), first_contact = contacts_.size();
-  for (const ContactPoint& contact : found) add(cached(contact, states), contact);
+  for (const ContactPoint& contact : found) add(cached(contact, of.states), contact);
   for (CachedContact entry : old) {
-    const ContactPoint moved = moved_with_bodies(entry, states);
+    const ContactPoint moved = moved_with_bodies(entry, of.states);
     const auto is_near = [&](const ContactPoint& one) { return norm(one.position - moved.position) <= near; };
     const auto others = std::span(contacts_).subspan(first_contact);
-    if (!is_just_lost(entry, moved, states, gap, near) || std::ranges::any_of(others, is_near)) continue;
+    if (!is_just_lost(entry, moved, of.states, of.fall(entry.pair), near) || std::ranges::any_of(others, is_near)) continue;
     entry.impulse = {};
     add(entry, moved);
   }

@@ -4,7 +4,7 @@
 #include <utility>
 #include <vector>
 
-#include "dynamics/contact_point.h"
+#include "dynamics/bodies_ahead.h"
 #include "tandem/kernels/object_pair.h"
 
 namespace tandem::dynamics {
@@ -28,10 +28,10 @@ class ContactCache {
   std::vector<ObjectPair> pairs() const;
 
   /// Makes the contacts of a step. Pairs that are kept have those remembered, moved with the bodies; these
-  /// may have become gaps. All others have those found, and those just lost: remembered ones that are gaps of
-  /// at most the larger gap of their bodies along the normal, slid by at most a fiftieth of the smaller
-  /// body's radius, with no other contact of the pair that near, for at most eight steps since they pushed.
-  /// Without these a body that comes off by a hair falls freely for a whole step, and deeper than it was.
+  /// may have become gaps, and are left out while the step will not close them. All others have those found, and
+  /// those just lost: remembered ones that are gaps along the normal of at most the pair's `fall()`, slid by at most a fiftieth of the smaller body's radius, with no other
+  /// contact of the pair that near, for at most eight steps since they pushed. Without these a body that
+  /// comes off by a hair falls freely for a whole step, and deeper than it was.
   ///
   /// These contacts start with the impulse of the remembered one of the pair that has the same feature, or
   /// else of the nearest one within a tenth of the smaller body's radius; each is given once. What then is
@@ -39,11 +39,8 @@ class ContactCache {
   /// none, so that a pair pushes as it did although its points have changed.
   ///
   /// Pairs of two idle bodies stay remembered and are left out. Conditions: found comes by ascending pair;
-  /// kept is ascending; idle is empty or has an entry for each body; gaps
-  /// has one for each, >= 0.
-  void update(std::span<const ContactPoint> found, std::span<const ObjectPair> kept,
-              std::span<const BodyProperties> bodies, std::span<const BodyState> states,
-              std::span<const std::uint8_t> idle, std::span<const double> gaps);
+  /// kept is ascending.
+  void update(std::span<const ContactPoint> found, std::span<const ObjectPair> kept, const BodiesAhead& of);
 
   /// Returns the contacts of the step that update() was last called for, by ascending pair.
   std::span<const ContactPoint> contacts() const { return contacts_; }
@@ -62,8 +59,8 @@ class ContactCache {
 
  private:
   // Makes the contacts of a pair that moved of those found and those just lost.
-  void renew(std::span<const CachedContact> old, std::span<const ContactPoint> found,
-             std::span<const BodyState> states, double gap, double radius);
+  void renew(std::span<const CachedContact> old, std::span<const ContactPoint> found, const BodiesAhead& of,
+             double radius);
   void add(const CachedContact& entry, const ContactPoint& contact);
 
   std::vector<CachedContact> entries_;  // by ascending pair

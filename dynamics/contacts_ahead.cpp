@@ -11,19 +11,6 @@ namespace {
 // pass by each other, a plane between them says too much about what lies ahead.
 constexpr double kFarthest = 0.25;
 
-// Bodies may fall towards each other by so many times what gravity and forces let a body fall in a step.
-constexpr double kFall = 2;
-
-// b is moved until it overlaps a by this: a length in which contacts are told well.
-double overlap_of(const BodiesAhead& of) {
-  return 0.5 * of.slop;
-}
-
-// How much nearer than by its velocity a body may come to others in a step.
-double margin_of(std::uint32_t body, const BodiesAhead& of) {
-  return kFall * of.pulls[body].most() * of.dt * of.dt + overlap_of(of);
-}
-
 bool comes_before(const ContactPoint& p, const ContactPoint& q) {
   return ObjectPair{p.body_a, p.body_b} < ObjectPair{q.body_a, q.body_b};
 }
@@ -51,8 +38,8 @@ std::span<const ObjectPair> ContactsAhead::find_near(const BodiesAhead& of) {
     if (before != apart_.end() && before->pair == pair)
       now.distance = before->distance - (way_[pair.a] + way_[pair.b]) * (1 + 1e-9);
     const double way = of.dt * (norm(approach_of(pair, of.states)) + turning_of(pair));
-    now.reach = std::min(way + std::max(margin_of(pair.a, of), margin_of(pair.b, of)),
-                         kFarthest * std::min(of.bodies[pair.a].radius, of.bodies[pair.b].radius));
+    const double margin = of.fall(pair) + of.overlap();
+    now.reach = std::min(way + margin, kFarthest * std::min(of.bodies[pair.a].radius, of.bodies[pair.b].radius));
     now.slow = way <= of.slop;
     if (now.slow) slow_.push_back(pair);
   }
@@ -62,7 +49,7 @@ std::span<const ObjectPair> ContactsAhead::find_near(const BodiesAhead& of) {
 
 void ContactsAhead::add_to(std::vector<ContactPoint>& found, std::span<const ObjectPair> kept,
                            const BodiesAhead& of) {
-  find_distances(found, kept, overlap_of(of));
+  find_distances(found, kept, of.overlap());
   find_approaches(of);
   if (approaches_.empty()) return;
   find_points(of);
@@ -77,7 +64,7 @@ void ContactsAhead::place(const BodiesAhead& of) {
   instances_.resize(bodies), turning_.resize(bodies);
   for (std::size_t i = 0; i < bodies; ++i) {
     instances_[i] = pose_of(of.bodies[i], of.states[i]);
-    if (!of.idle.empty() && of.idle[i] != 0) motion_[i] = Motion::fixed;
+    if (of.is_idle(static_cast<std::uint32_t>(i))) motion_[i] = Motion::fixed;
     turning_[i] = motion_[i] == Motion::fixed ? 0 : of.bodies[i].radius * norm(of.states[i].angular_velocity);
   }
   filter_.motion = motion_.data();
@@ -104,14 +91,14 @@ Vector3 ContactsAhead::approach_of(const ObjectPair& pair, std::span<const BodyS
 
 // The largest reach that any pair may have.
 double ContactsAhead::farthest(const BodiesAhead& of) const {
-  double way = 0, radius = 0, margin = 0;
+  double way = 0, radius = 0, fall = 0;
   for (std::uint32_t i = 0; i < of.bodies.size(); ++i) {
     if (is_still(i)) continue;
     way = std::max(way, of.dt * (norm(of.states[i].velocity) + turning_[i]));
     radius = std::max(radius, of.bodies[i].radius);
-    margin = std::max(margin, margin_of(i, of));
+    fall = std::max(fall, of.fall(i));
   }
-  return std::min(2 * way + margin, kFarthest * radius);
+  return std::min(2 * way + fall + of.overlap(), kFarthest * radius);
 }
 
 // Finds the distances of pairs that may come together within the step: asked_. They are asked about together
@@ -160,12 +147,9 @@ void ContactsAhead::find_approaches(const BodiesAhead& of) {
     const double gap = norm(from_b);
     if (!(gap > 0)) continue;
     const double closing = dot(approach_of(pair, of.states), from_b) / gap + turning_of(pair);
-    const Pull &on_a = of.pulls[pair.a], &on_b = of.pulls[pair.b];
-    const double pulled = std::max(std::fabs(dot(on_a.linear, from_b)), std::fabs(dot(on_b.linear, from_b)));
-    const double falls = (kFall * pulled / gap + kFall * (on_a.turning + on_b.turning)) * of.dt;
     const double most = kFarthest * std::min(of.bodies[pair.a].radius, of.bodies[pair.b].radius);
-    const double overlap = overlap_of(of);
-    if (gap <= std::min(most, of.dt * (std::max(0.0, closing) + falls) + overlap))
+    const double overlap = of.overlap();
+    if (gap <= std::min(most, of.dt * std::max(0.0, closing) + of.fall_along(pair, from_b / gap) + overlap))
       approaches_.push_back({pair, ((gap + overlap) / gap) * from_b});
   }
 }

@@ -2,20 +2,11 @@
 #include <span>
 #include <vector>
 
+#include "dynamics/bodies_ahead.h"
 #include "dynamics/contact_finder.h"
 #include "tandem/kernels/distance_query.h"
 
 namespace tandem::dynamics {
-
-/// Bodies before a step.
-struct BodiesAhead {
-  std::span<const BodyProperties> bodies;
-  std::span<const BodyState> states;
-  std::span<const std::uint8_t> idle;  ///< empty, or one for each body
-  double dt;
-  std::span<const Pull> pulls;  ///< of each body
-  double slop;
-};
 
 /// Finds contacts of bodies that do not touch yet but may within the step, with their gaps, so that the
 /// solver stops them where they meet, and not a step later and deep in each other.
@@ -29,9 +20,9 @@ class ContactsAhead {
   /// at. Throws QueryFailed.
   ContactsAhead(std::span<const AssetView> assets, std::uint32_t threads, const PairFilter& filter = {});
 
-  /// Finds which bodies are near each other. Result: the pairs of these whose points move against each other
-  /// by no more than the slop in this step, ascending; valid until the next call. Such a pair keeps what is
-  /// known of it until it has moved by more than that. Throws QueryFailed.
+  /// Finds which bodies are near each other. Result: the pairs of these whose points move against each other by
+  /// no more than the slop in this step, ascending; valid until the next call. Such a pair keeps what is known
+  /// of it until it has moved by more than that. Throws QueryFailed.
   std::span<const ObjectPair> find_near(const BodiesAhead& of);
 
   /// Adds the contacts ahead of pairs to those found, so that these still come by ascending pair. Pairs that

@@ -2,41 +2,59 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
-#include <span>
 #include <thread>
 
 #include "dynamics/threads.h"
 
 namespace tandem::dynamics {
 
-/// Calls part(phase, i) for each i below parts[phase], phase after phase: a phase begins when all parts of
-/// the one before are done. Parts of one phase run side by side, and in no order. They must not throw.
-template <typename Part>
-void run_phases(Threads& threads, std::span<const std::uint32_t> parts, const Part& part) {
+/// A part of all: from `begin` to `end`.
+struct PhasePart {
+  std::size_t begin, end;
+};
+
+/// Returns part i of n of as many things, contiguous and as large as the others.
+inline PhasePart part_of(std::size_t things, std::uint32_t i, std::uint32_t n) {
+  return {things * i / n, things * (i + 1) / n};
+}
+
+/// Calls work(phase, i, n) for each phase below `phases` and i below n, phase after phase: a phase begins when
+/// all calls of the one before have ended, and calls of one phase run side by side. n is how many threads come at
+/// once, and the same in all phases. They must not throw.
+template <typename Work>
+void run_phases(Threads& threads, std::size_t phases, const Work& work) {
   if (threads.count() == 1) {
-    for (std::size_t phase = 0; phase < parts.size(); ++phase) {
-      for (std::uint32_t i = 0; i < parts[phase]; ++i) part(phase, i);
-    }
+    for (std::size_t phase = 0; phase < phases; ++phase) work(phase, 0u, 1u);
     return;
   }
-  // Each takes the next part of all, and waits until those of earlier phases are done. These have all been
-  // taken by then, so that whoever waits waits for threads that work.
   struct alignas(64) Counter {
     std::atomic<std::uint64_t> value = 0;
-  } taken, done;
+  } come, closed, done;
+  const auto wait_until = [](const auto& condition) {
+    constexpr int kLooks = 4000;  // some microseconds
+    for (int look = 0; !condition(); ++look) {
+      if (look > kLooks) std::this_thread::yield();
+    }
+  };
   threads.on_each([&] {
-    std::uint64_t begin = 0;  // of the phase
-    std::size_t phase = 0;
-    for (;;) {
-      const std::uint64_t next = taken.value.fetch_add(1, std::memory_order_relaxed);
-      for (; phase < parts.size() && next >= begin + parts[phase]; ++phase) begin += parts[phase];
-      if (phase == parts.size()) return;
-      constexpr int kLooks = 2000;
-      for (int look = 0; done.value.load(std::memory_order_acquire) < begin; ++look) {
-        if (look > kLooks) std::this_thread::yield();
+    // Whoever comes late goes again: the first closes the door when all are there, or have had time to be.
+    constexpr std::uint64_t kClosed = std::uint64_t{1} << 32;
+    const std::uint64_t before = come.value.fetch_add(1, std::memory_order_acq_rel);
+    if (before >= kClosed) return;
+    const auto i = static_cast<std::uint32_t>(before);
+    if (i == 0) {
+      constexpr int kLooks = 20'000;
+      for (int look = 0; look < kLooks && come.value.load(std::memory_order_relaxed) < threads.count(); ++look) {
       }
-      part(phase, static_cast<std::uint32_t>(next - begin));
-      done.value.fetch_add(1, std::memory_order_release);
+      closed.value.store(come.value.fetch_or(kClosed, std::memory_order_acq_rel), std::memory_order_release);
+    } else {
+      wait_until([&] { return closed.value.load(std::memory_order_acquire) != 0; });
+    }
+    const auto n = static_cast<std::uint32_t>(closed.value.load(std::memory_order_acquire));
+    for (std::size_t phase = 0; phase < phases; ++phase) {
+      work(phase, i, n);
+      done.value.fetch_add(1, std::memory_order_acq_rel);
+      wait_until([&] { return done.value.load(std::memory_order_acquire) >= (phase + 1) * n; });
     }
   });
 }

@@ -57,7 +57,6 @@ void Simulation::find_pulls() {
 }
 
 void Simulation::find_contacts(StepRecord& record) {
-  constexpr double kFall = 2;  // times what gravity lets a body fall in a step
   const std::vector<std::uint8_t> idle = this->idle();
   const BodiesAhead ahead = {acting_, states_, idle, options_.dt, pulls_, options_.solver.slop};
   std::vector<ObjectPair> remembered = cache_.pairs();
@@ -71,10 +70,8 @@ void Simulation::find_contacts(StepRecord& record) {
   found_ = parts_.contacts->find(poses(), idle, {remembered, options_.solver.slop});
   take(record, parts_.contacts->report());
   stopwatch.lap();
-  std::vector<double> gaps;
-  for (const Pull& pull : pulls_) gaps.push_back(kFall * pull.most() * options_.dt * options_.dt);
   if (parts_.ahead) parts_.ahead->add_to(found_, parts_.contacts->kept(), ahead);
-  cache_.update(found_, parts_.contacts->kept(), bodies_, states_, idle, gaps);
+  cache_.update(found_, parts_.contacts->kept(), ahead);
   record.broad_phase += near_seconds;
   record.generation += stopwatch.lap();
   record.contacts = cache_.contacts().size();
@@ -91,8 +88,9 @@ void Simulation::solve(StepRecord& record) {
   std::vector<ContactImpulse> impulses(contacts.size());
   if (options_.solver.warm_start) impulses = cache_.impulses();
   const std::vector<BodyState> before = parts_.continuous ? states_ : std::vector<BodyState>();
-  parts_.solver->step({acting_, contacts, islands_, options_.dt, pulls_, step_, cache_.is_cold(), threads_},
-                      states_, impulses);
+  parts_.solver->step(
+      {acting_, contacts, islands_, options_.dt, pulls_, step_, cache_.is_cold(), threads_},
+      states_, impulses);
   if (parts_.continuous) parts_.continuous->limit(acting_, before, states_, options_.solver.slop);
   cache_.remember(impulses);
   touches_.update(contacts, impulses, idle());
@@ -135,8 +133,7 @@ void Simulation::take_measures(StepRecord& record) const {
     const BodyState& state = states_[i];
     const double speed = norm(state.velocity);
     record.kinetic_energy += kinetic_energy(bodies_[i], state);
-    record.potential_energy -=
-        bodies_[i].gravity_scale * bodies_[i].mass * dot(options_.gravity, state.position);
+    record.potential_energy -= bodies_[i].gravity_scale * bodies_[i].mass * dot(options_.gravity, state.position);
     record.linear_momentum += bodies_[i].mass * state.velocity;
     record.angular_momentum += angular_momentum(bodies_[i], state);
     record.speed_max = std::max(record.speed_max, speed);

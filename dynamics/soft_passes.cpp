@@ -7,6 +7,12 @@
 namespace tandem::dynamics {
 namespace {
 
+struct OneTruth {
+  bool is_true;
+
+  friend bool any(OneTruth mask) { return mask.is_true; }
+};
+
 // One float32 with the operations of Lanes.
 struct OneLane {
   static constexpr int kLanes = 1;
@@ -19,10 +25,10 @@ struct OneLane {
   friend OneLane operator*(OneLane a, OneLane b) { return {a.v * b.v}; }
   friend OneLane operator*(float a, OneLane b) { return {a * b.v}; }
   friend OneLane operator/(OneLane a, OneLane b) { return {a.v / b.v}; }
-  friend bool less(OneLane a, OneLane b) { return a.v < b.v; }
+  friend OneTruth less(OneLane a, OneLane b) { return {a.v < b.v}; }
   friend OneLane magnitude(OneLane a) { return {std::fabs(a.v)}; }
   friend OneLane square_root(OneLane a) { return {std::sqrt(a.v)}; }
-  friend OneLane select(bool mask, OneLane a, OneLane b) { return mask ? a : b; }
+  friend OneLane select(OneTruth mask, OneLane a, OneLane b) { return mask.is_true ? a : b; }
   friend OneLane larger(OneLane a, OneLane b) { return select(less(a, b), b, a); }
   friend Vector3Of<OneLane> gathered(const float* const* rows, OneLane) {
     return {{rows[0][0]}, {rows[0][1]}, {rows[0][2]}};

@@ -1,4 +1,5 @@
 #pragma once
+#include <algorithm>
 #include <cstring>
 
 #include "dynamics/soft_rows.h"
@@ -8,8 +9,8 @@
 #define TANDEM_INLINE inline
 #endif
 
-// The passes of a soft step by L: OneLane of soft_passes.cpp, or Lanes of a kind. As lanes.h, this is
-// included by files that are compiled for different machines: all of it has internal linkage.
+// The passes of a soft step by L: OneLane of soft_passes.cpp, or Lanes of a kind. As lanes.h, this is included by
+// files that are compiled for different machines: all of it has internal linkage.
 namespace tandem::dynamics {
 namespace {
 
@@ -30,6 +31,13 @@ TANDEM_INLINE L taken(const SoftNumber& from, int lane) {
 template <typename L>
 TANDEM_INLINE void put(const L& x, SoftNumber& to, int lane) {
   std::memcpy(to.of + lane, &x.v, sizeof x.v);
+}
+
+template <typename L>
+TANDEM_INLINE float at(const L& x, int lane) {
+  float all[L::kLanes];
+  std::memcpy(all, &x.v, sizeof all);
+  return all[lane];
 }
 
 template <typename L>
@@ -107,18 +115,17 @@ TANDEM_INLINE void scatter(const Vector3Of<Lanes<kCount>>& p, float* const* rows
 #endif
 
 template <typename L>
-TANDEM_INLINE Vector3Of<L> gathered(const SoftRows& rows, const std::uint32_t* bodies,
-                                    float (SoftBody::*what)[4]) {
+TANDEM_INLINE Vector3Of<L> gathered(const SoftMotion* of, const std::uint32_t* bodies, float (SoftMotion::*what)[4]) {
   const float* places[L::kLanes];
-  for (int i = 0; i < L::kLanes; ++i) places[i] = rows.bodies[bodies[i]].*what;
+  for (int i = 0; i < L::kLanes; ++i) places[i] = of[bodies[i]].*what;
   return gathered(places, L{});
 }
 
 template <typename L>
-TANDEM_INLINE void scatter(const Vector3Of<L>& p, const SoftRows& rows, const std::uint32_t* bodies,
-                           float (SoftBody::*what)[4]) {
+TANDEM_INLINE void scatter(const Vector3Of<L>& p, SoftMotion* of, const std::uint32_t* bodies,
+                           float (SoftMotion::*what)[4]) {
   float* places[L::kLanes];
-  for (int i = 0; i < L::kLanes; ++i) places[i] = rows.bodies[bodies[i]].*what;
+  for (int i = 0; i < L::kLanes; ++i) places[i] = of[bodies[i]].*what;
   scatter(p, places);
 }
 
@@ -126,22 +133,28 @@ TANDEM_INLINE void scatter(const Vector3Of<L>& p, const SoftRows& rows, const st
 template <typename L>
 class PairVisit {
  public:
-  TANDEM_INLINE PairVisit(const SoftRows& rows, SoftPairs& pairs, int lane)
+  TANDEM_INLINE PairVisit(const SoftRows& rows, std::uint32_t group, int lane) : PairVisit(rows, rows.pairs[group], rows.turnings[group], lane) {}
+
+ private:
+  TANDEM_INLINE PairVisit(const SoftRows& rows, SoftPairs& pairs, SoftTurning& turning, int lane)
       : rows_(rows),
         pairs_(pairs),
+        turning_(turning),
         lane_(lane),
-        velocity_a_(gathered<L>(rows, pairs.body_a + lane, &SoftBody::velocity)),
-        velocity_b_(gathered<L>(rows, pairs.body_b + lane, &SoftBody::velocity)),
-        spin_a_(gathered<L>(rows, pairs.body_a + lane, &SoftBody::spin)),
-        spin_b_(gathered<L>(rows, pairs.body_b + lane, &SoftBody::spin)),
+        velocity_a_(gathered<L>(rows.velocities, pairs.body_a + lane, &SoftMotion::centre)),
+        velocity_b_(gathered<L>(rows.velocities, pairs.body_b + lane, &SoftMotion::centre)),
+        spin_a_(gathered<L>(rows.velocities, pairs.body_a + lane, &SoftMotion::spin)),
+        spin_b_(gathered<L>(rows.velocities, pairs.body_b + lane, &SoftMotion::spin)),
         inverse_mass_a_(taken<L>(pairs.inverse_mass_a, lane)),
         inverse_mass_b_(taken<L>(pairs.inverse_mass_b, lane)) {}
 
+
+ public:
   TANDEM_INLINE void write() const {
-    scatter(velocity_a_, rows_, pairs_.body_a + lane_, &SoftBody::velocity);
-    scatter(velocity_b_, rows_, pairs_.body_b + lane_, &SoftBody::velocity);
-    scatter(spin_a_, rows_, pairs_.body_a + lane_, &SoftBody::spin);
-    scatter(spin_b_, rows_, pairs_.body_b + lane_, &SoftBody::spin);
+    scatter(velocity_a_, rows_.velocities, pairs_.body_a + lane_, &SoftMotion::centre);
+    scatter(velocity_b_, rows_.velocities, pairs_.body_b + lane_, &SoftMotion::centre);
+    scatter(spin_a_, rows_.velocities, pairs_.body_a + lane_, &SoftMotion::spin);
+    scatter(spin_b_, rows_.velocities, pairs_.body_b + lane_, &SoftMotion::spin);
   }
 
   TANDEM_INLINE void start() {
@@ -151,7 +164,7 @@ class PairVisit {
       push(direction(row.first), take(row.first_impulse));
       push(direction(row.second), take(row.second_impulse));
     }
-    turn({take(pairs_.turn_impulse[0]), take(pairs_.turn_impulse[1]), take(pairs_.turn_impulse[2])});
+    turn(taken<L>(turning_.impulse, lane_));
   }
 
   TANDEM_INLINE void push_apart() {
@@ -162,55 +175,57 @@ class PairVisit {
     for (std::uint32_t i = 0; i < pairs_.contacts; ++i) {
       SoftNormal& row = normal(i);
       const L followed = take(row.followed);
-      const L deep = smaller(none, followed + take(row.opposed));
+      const L deep = smaller(none, pairs_.is_opposed ? followed + take(gap(i).opposed) : followed);
       const auto is_gap = less(none, followed);
       const L bias = select(is_gap, followed * inverse_h, larger(bias_rate * deep, fastest));
-      visit(row, bias, select(is_gap, one, mass_scale), select(is_gap, none, impulse_scale));
+      visit(i, bias, select(is_gap, one, mass_scale), select(is_gap, none, impulse_scale));
     }
   }
 
-  // Condition: `moved` and `turned` of the bodies are those of this time.
+  // Condition: rows.moved is that of this time.
   TANDEM_INLINE void follow(float time) {
-    const auto moved = gathered<L>(rows_, pairs_.body_b + lane_, &SoftBody::moved) -
-                       gathered<L>(rows_, pairs_.body_a + lane_, &SoftBody::moved);
-    const auto turned_a = gathered<L>(rows_, pairs_.body_a + lane_, &SoftBody::turned),
-               turned_b = gathered<L>(rows_, pairs_.body_b + lane_, &SoftBody::turned);
+    const auto moved = gathered<L>(rows_.moved, pairs_.body_b + lane_, &SoftMotion::centre) -
+                       gathered<L>(rows_.moved, pairs_.body_a + lane_, &SoftMotion::centre);
+    const auto turned_a = gathered<L>(rows_.moved, pairs_.body_a + lane_, &SoftMotion::spin),
+               turned_b = gathered<L>(rows_.moved, pairs_.body_b + lane_, &SoftMotion::spin);
     for (std::uint32_t i = 0; i < pairs_.contacts; ++i) {
       SoftNormal& row = normal(i);
       const Direction along = direction(row.direction);
       const L change = dot(along.along, moved) + dot(along.turn_a, turned_a) + dot(along.turn_b, turned_b);
-      put(take(row.separation) + change + time * take(row.drive), row.followed, lane_);
+      put(take(gap(i).separation) + change + time * take(row.drive), row.followed, lane_);
     }
   }
 
   TANDEM_INLINE void relax() {
     const L none{}, one = all_of<L>(1), inverse_h = all_of<L>(rows_.inverse_h);
-    for (std::uint32_t i = 0; i < pairs_.contacts; ++i) {
-      SoftNormal& row = normal(i);
-      visit(row, larger(none, take(row.followed) * inverse_h), one, none);
-    }
+    for (std::uint32_t i = 0; i < pairs_.contacts; ++i)
+      visit(i, larger(none, take(normal(i).followed) * inverse_h), one, none);
   }
 
+  // Where nothing pushes, and friction was 0, it stays so.
   TANDEM_INLINE void rub() {
+    const L none{};
     L all{};
     for (std::uint32_t i = 0; i < pairs_.contacts; ++i) {
+      SoftFriction& row = friction(i);
       const L push = take(normal(i).impulse);
       all = all + push;
-      rub(friction(i), push);
+      const L before = larger(magnitude(take(row.first_impulse)), magnitude(take(row.second_impulse)));
+      if (any(less(none, larger(push, before)))) rub(row, push);
     }
-    resist_turning(all);
+    const Vector3Of<L> turning = taken<L>(turning_.impulse, lane_);
+    if (any(less(none, larger(all, dot(turning, turning))))) resist_turning(all);
   }
 
   TANDEM_INLINE void rebound() {
     const L none{}, one = all_of<L>(1);
     for (std::uint32_t i = 0; i < pairs_.contacts; ++i) {
       SoftNormal& row = normal(i);
-      const L wanted = take(row.rebound);
+      const L wanted = take(gap(i).rebound);
       const L old = take(row.impulse);
       const Direction along = direction(row.direction);
       const L next = next_impulse(row, along, old, -wanted, one, none);
-      const L change =
-          select(less(none, wanted), select(less(none, take(row.strongest)), next - old, none), none);
+      const L change = select(less(none, wanted), select(less(none, take(gap(i).strongest)), next - old, none), none);
       push(along, change);
       put(old + change, row.impulse, lane_);
     }
@@ -221,15 +236,14 @@ class PairVisit {
     const L none{}, inverse_h = all_of<L>(rows_.inverse_h);
     L largest{}, squares{};
     const auto add = [&](const L& change, const L& mass) {
-      const L size =
-          select(less(none, mass), magnitude(change) / select(less(none, mass), mass, all_of<L>(1)), none);
+      const L size = select(less(none, mass), magnitude(change) / select(less(none, mass), mass, all_of<L>(1)), none);
       largest = larger(largest, size);
       squares = squares + size * size;
     };
     for (std::uint32_t i = 0; i < pairs_.contacts; ++i) {
       const SoftNormal& row = normal(i);
-      const L old = take(row.impulse), rebound = take(row.rebound);
-      const auto bounces = less(none, smaller(rebound, take(row.strongest)));
+      const L old = take(row.impulse), rebound = take(gap(i).rebound);
+      const auto bounces = less(none, smaller(rebound, take(gap(i).strongest)));
       const L bias = select(bounces, -rebound, larger(none, take(row.followed) * inverse_h));
       add(next_impulse(row, direction(row.direction), old, bias, all_of<L>(1), none) - old, take(row.mass));
       const SoftFriction& rubs = friction(i);
@@ -240,8 +254,10 @@ class PairVisit {
       add(within(wanted1, rest_of(bound, old2)) - old1, mass);
       add(within(wanted2, rest_of(bound, old1)) - old2, mass);
     }
-    put(largest, pairs_.largest_residual, lane_);
-    put(squares, pairs_.residual_squares, lane_);
+    for (int i = 0; i < L::kLanes; ++i) {
+      pairs_.largest_residual = std::max(pairs_.largest_residual, at(largest, i));
+      pairs_.residual_squares += at(squares, i);
+    }
   }
 
  private:
@@ -256,6 +272,7 @@ class PairVisit {
   TANDEM_INLINE SoftNormal& normal(std::uint32_t contact) const {
     return rows_.normals[pairs_.first + contact];
   }
+  TANDEM_INLINE SoftGap& gap(std::uint32_t contact) const { return rows_.gaps[pairs_.first + contact]; }
   TANDEM_INLINE SoftFriction& friction(std::uint32_t contact) const {
     return rows_.frictions[pairs_.first + contact];
   }
@@ -276,13 +293,14 @@ class PairVisit {
     const L wanted = impulse - take(row.mass) * mass_scale * (w + bias) - impulse_scale * impulse;
     return larger(L{}, wanted);
   }
-  TANDEM_INLINE void visit(SoftNormal& row, const L& bias, const L& mass_scale, const L& impulse_scale) {
+  TANDEM_INLINE void visit(std::uint32_t contact, const L& bias, const L& mass_scale, const L& impulse_scale) {
+    SoftNormal& row = normal(contact);
     const L impulse = take(row.impulse);
     const Direction along = direction(row.direction);
     const L next = next_impulse(row, along, impulse, bias, mass_scale, impulse_scale);
     push(along, next - impulse);
     put(next, row.impulse, lane_);
-    put(larger(take(row.strongest), next), row.strongest, lane_);
+    if (pairs_.bounces) put(larger(take(gap(contact).strongest), next), gap(contact).strongest, lane_);
   }
 
   TANDEM_INLINE void rub(SoftFriction& row, const L& push_of_normal) {
@@ -313,8 +331,8 @@ class PairVisit {
   TANDEM_INLINE static L within(const L& x, const L& bound) { return larger(-bound, smaller(x, bound)); }
 
   TANDEM_INLINE void turn(const Vector3Of<L>& impulse) {
-    spin_a_ = spin_a_ - across(pairs_.spread_a, impulse);
-    spin_b_ = spin_b_ + across(pairs_.spread_b, impulse);
+    spin_a_ = spin_a_ - across(turning_.spread_a, impulse);
+    spin_b_ = spin_b_ + across(turning_.spread_b, impulse);
   }
   TANDEM_INLINE Vector3Of<L> row(const SoftNumber* matrix, int i) const {
     return {take(matrix[3 * i]), take(matrix[3 * i + 1]), take(matrix[3 * i + 2])};
@@ -327,20 +345,21 @@ class PairVisit {
   }
 
   TANDEM_INLINE void resist_turning(const L& push_of_normals) {
-    const L bound = take(pairs_.lever) * push_of_normals, mass = take(pairs_.turn_mass);
-    const Vector3Of<L> turning = applied(pairs_.spread_b, spin_b_) - applied(pairs_.spread_a, spin_a_) +
-                                 taken<L>(pairs_.turn_drive, lane_);
-    const Vector3Of<L> old = taken<L>(pairs_.turn_impulse, lane_);
+    const L bound = take(turning_.lever) * push_of_normals, mass = take(turning_.mass);
+    const Vector3Of<L> turning = applied(turning_.spread_b, spin_b_) - applied(turning_.spread_a, spin_a_) +
+                                 taken<L>(turning_.drive, lane_);
+    const Vector3Of<L> old = taken<L>(turning_.impulse, lane_);
     Vector3Of<L> next = old - mass * turning;
     next = shortening(square_root(dot(next, next)), bound) * next;
     turn(next - old);
-    put(next.x, pairs_.turn_impulse[0], lane_);
-    put(next.y, pairs_.turn_impulse[1], lane_);
-    put(next.z, pairs_.turn_impulse[2], lane_);
+    put(next.x, turning_.impulse[0], lane_);
+    put(next.y, turning_.impulse[1], lane_);
+    put(next.z, turning_.impulse[2], lane_);
   }
 
   const SoftRows& rows_;
   SoftPairs& pairs_;
+  SoftTurning& turning_;
   int lane_;
   Vector3Of<L> velocity_a_, velocity_b_, spin_a_, spin_b_;
   L inverse_mass_a_, inverse_mass_b_;
@@ -350,9 +369,8 @@ template <typename L, typename Visit>
 TANDEM_INLINE void visit_all(const SoftRows& rows, std::uint32_t begin, std::uint32_t end,
                              const Visit& visit) {
   for (std::uint32_t i = begin; i < end; ++i) {
-    SoftPairs& pairs = rows.pairs[i];
-    for (int lane = 0; lane < static_cast<int>(pairs.pairs); lane += L::kLanes) {
-      PairVisit<L> bodies(rows, pairs, lane);
+    for (int lane = 0; lane < static_cast<int>(rows.pairs[i].pairs); lane += L::kLanes) {
+      PairVisit<L> bodies(rows, i, lane);
       visit(bodies);
       bodies.write();
     }
@@ -378,7 +396,8 @@ constexpr SoftPasses kSoftPassesOf = {
     },
     [](const SoftRows& rows, std::uint32_t begin, std::uint32_t end, float) {
       for (std::uint32_t i = begin; i < end; ++i) {
-        if (rows.pairs[i].bounces) visit_all<L>(rows, i, i + 1, [](PairVisit<L>& visit) { visit.rebound(); });
+        if (rows.pairs[i].bounces)
+          visit_all<L>(rows, i, i + 1, [](PairVisit<L>& visit) { visit.rebound(); });
       }
     },
     [](const SoftRows& rows, std::uint32_t begin, std::uint32_t end, float) {

@@ -5,8 +5,8 @@
 
 namespace tandem::dynamics {
 
-/// Pairs of bodies that a soft step solves side by side: no two of them move the same body, so that the
-/// result does not depend on how many a machine takes at once.
+/// Pairs of bodies that a soft step solves side by side: no two of them move the same body, so that the result
+/// does not depend on how many a machine takes at once.
 inline constexpr int kSoftWidth = 16;
 
 /// A number of each pair.
@@ -14,26 +14,32 @@ struct alignas(64) SoftNumber {
   float of[kSoftWidth];
 };
 
-/// A body in a soft step: its velocity, its spin in coordinates in which its inertia is 1, and what these
-/// have come to since the step began. The last of each four is 0.
-struct alignas(64) SoftBody {
-  float velocity[4], spin[4], moved[4], turned[4];
+/// How a body moves in a soft step, or how far it has since the step began: its centre, and its spin in
+/// coordinates in which its inertia is 1. The last of each four is 0.
+struct alignas(32) SoftMotion {
+  float centre[4], spin[4];
 };
 
-/// A direction of a contact: its velocity is along . (velocity_b - velocity_a) + turn_a . spin_a + turn_b .
-/// spin_b.
+/// A direction of a contact: its velocity is along . (centre_b - centre_a) + turn_a . spin_a + turn_b . spin_b.
 struct SoftDirection {
   SoftNumber along[3], turn_a[3], turn_b[3];
 };
 
-/// The normals of one contact of each pair.
+/// The normals of one contact of each pair: what every sweep looks at.
 struct SoftNormal {
   SoftDirection direction;
   SoftNumber mass;  ///< 0 where a pair has no such contact
-  SoftNumber drive, separation, rebound;
-  SoftNumber opposed;   ///< by how much depth the push is less
+  SoftNumber drive;
   SoftNumber followed;  ///< the separation as it changes
-  SoftNumber impulse, strongest;
+  SoftNumber impulse;
+};
+
+/// What few sweeps look at.
+struct SoftGap {
+  SoftNumber separation;  ///< at the start of the step
+  SoftNumber opposed;     ///< by how much depth the push is less
+  SoftNumber rebound;     ///< the velocity along the normal that restitution asks for, or 0
+  SoftNumber strongest;   ///< the largest impulse of any visit, where a pair of the group bounces
 };
 
 /// Their friction.
@@ -43,26 +49,34 @@ struct SoftFriction {
   SoftNumber first_drive, second_drive, first_impulse, second_impulse;
 };
 
+/// How each pair turns, and what resists that.
+struct SoftTurning {
+  SoftNumber spread_a[9], spread_b[9];  ///< turn spins into those of the world, row by row
+  SoftNumber drive[3], mass, lever, impulse[3];
+};
+
 /// Up to kSoftWidth pairs of one colour.
 struct SoftPairs {
-  std::uint32_t body_a[kSoftWidth], body_b[kSoftWidth];  ///< what contacts do not move has a body of its own,
-                                                         ///< of no inverse mass, for each pair
+  std::uint32_t body_a[kSoftWidth], body_b[kSoftWidth];  ///< one of the group stands for all that contacts do
+                                                         ///< not move, and has no inverse mass
   SoftNumber inverse_mass_a, inverse_mass_b;
   SoftNumber bias_rate, mass_scale, impulse_scale;  ///< of a soft row where bodies are too deep in each other
-  SoftNumber spread_a[9], spread_b[9];              ///< turn spins into those of the world, row by row
-  SoftNumber turn_drive[3], turn_mass, turn_impulse[3], lever;
-  SoftNumber largest_residual, residual_squares;
-  std::uint32_t pairs;     ///< how many
-  std::uint32_t first;     ///< of their normals and frictions
-  std::uint32_t contacts;  ///< of the pair that has the most
-  bool bounces;            ///< a rebound is more than 0
+  std::uint32_t pairs = 0;                          ///< how many
+  std::uint32_t first = 0;                          ///< of their rows
+  std::uint32_t contacts = 0;                       ///< of the pair that has the most
+  bool bounces = false;                             ///< a rebound is more than 0
+  bool is_opposed = false;                          ///< an `opposed` is more than 0
+  float largest_residual = 0, residual_squares = 0;  ///< of the rows, a result
 };
 
 /// All that the passes of a soft step read and write.
 struct SoftRows {
-  SoftBody* bodies;
+  SoftMotion* velocities;    ///< of each body
+  const SoftMotion* moved;   ///< how far each has
   SoftPairs* pairs;
+  SoftTurning* turnings;
   SoftNormal* normals;
+  SoftGap* gaps;
   SoftFriction* frictions;
   float inverse_h;  ///< of the seconds of a substep
 };

@@ -11,6 +11,7 @@ namespace {
 
 constexpr std::size_t kBodiesAtOnce = 64;  // that a thread takes
 constexpr std::uint32_t kGroupsAtOnce = 4;
+constexpr std::uint32_t kSharedGroups = 6;  // that are worth the time in which threads wait for each other
 
 // Bits that look like chance, of a pair of bodies.
 std::uint32_t shuffled(std::uint32_t a, std::uint32_t b) {
@@ -21,8 +22,7 @@ std::uint32_t shuffled(std::uint32_t a, std::uint32_t b) {
 }
 
 void put(const Vector3& x, float (&to)[4]) {
-  to[0] = static_cast<float>(x.x), to[1] = static_cast<float>(x.y), to[2] = static_cast<float>(x.z),
-  to[3] = 0;
+  to[0] = static_cast<float>(x.x), to[1] = static_cast<float>(x.y), to[2] = static_cast<float>(x.z), to[3] = 0;
 }
 void put(double x, SoftNumber& to, int lane) {
   to.of[lane] = static_cast<float>(x);
@@ -38,8 +38,12 @@ void put(const MassScale& scale, SoftNumber (&to)[9], int lane) {
 void put(const ContactRow& row, const Vector3& along, SoftDirection& to, int lane) {
   put(along, to.along, lane), put(row.a.angular, to.turn_a, lane), put(row.b.angular, to.turn_b, lane);
 }
+// Lanes that are left out together may leave a zero its sign; here it has none.
+double unsigned_zero(float x) {
+  return x + 0.0;
+}
 Vector3 first_three(const float (&from)[4]) {
-  return {from[0], from[1], from[2]};
+  return {unsigned_zero(from[0]), unsigned_zero(from[1]), unsigned_zero(from[2])};
 }
 double inverse_mass(const SteppedBody& body) {
   return body.moves ? 1 / (body.scale.root_mass * body.scale.root_mass) : 0;
@@ -49,15 +53,14 @@ double inverse_mass(const SteppedBody& body) {
 // other deeper, the pushes are hundreds of times their weight, and whichever point is found next throws
 // them about. So a deep contact pushes for what it is deeper than the same pair's contacts that push
 // against it. Result: by how much.
-double opposed(std::span<const ContactPoint> all, std::span<const std::uint32_t> of_pair,
-               const Vector3& normal, double separation, double slop) {
+double opposed(std::span<const ContactPoint> all, std::span<const std::uint32_t> of_pair, const Vector3& normal,
+               double separation, double slop) {
   constexpr double kDeep = 4;  // slops
   const double deep = kDeep * slop;
   if (separation > -deep) return 0;
   double opposed = 0;
   for (const std::uint32_t other : of_pair)
-    opposed = std::max(
-        opposed, -std::min(dot(normal, all[other].normal), 0.0) * std::max(all[other].depth - slop, 0.0));
+    opposed = std::max(opposed, -std::min(dot(normal, all[other].normal), 0.0) * std::max(all[other].depth - slop, 0.0));
   return std::min(opposed, -deep - separation);
 }
 
@@ -67,6 +70,7 @@ struct SoftSolver::Step {
   const StepInput& input;
   const SolverOptions& options;
   RowMaker rows;
+  std::span<const BodyState> states;
   std::span<const ContactImpulse> impulses;
   double h = input.dt / options.substeps;
   Softness between_movers = softness(1 / (8 * h), 10, h), against_unmoved = softness(2 / (8 * h), 5, h);
@@ -82,9 +86,9 @@ Residual SoftSolver::solve(const StepInput& input, std::span<const std::uint32_t
                            const SolverOptions& options, std::span<BodyState> states,
                            std::span<ContactImpulse> impulses) {
   if (islands.empty()) return {};
-  const Step step = {input, options, RowMaker(input, states, options), impulses};
+  const Step step = {input, options, RowMaker(input, states, options), states, impulses};
   gather(step, islands);
-  group_by_colour();
+  make_groups(step);
   fill(step);
   run(step);
   write(step, states, impulses);
@@ -108,8 +112,7 @@ void SoftSolver::gather(const Step& step, std::span<const std::uint32_t> islands
       const ObjectPair pair = {contact.body_a, contact.body_b};
       if (pair != last) {
         last = pair;
-        pairs_.push_back(
-            {static_cast<std::uint32_t>(contacts_.size()), 0, place(pair.a), place(pair.b), 0, 0});
+        pairs_.push_back({static_cast<std::uint32_t>(contacts_.size()), 0, place(pair.a), place(pair.b), 0, 0});
       }
       contacts_.push_back(i);
       ++pairs_.back().contacts;
@@ -117,23 +120,55 @@ void SoftSolver::gather(const Step& step, std::span<const std::uint32_t> islands
   }
 }
 
-// Gives each pair a place in a group of its colour, those with many contacts first, so that few places of a
-// group are empty.
-void SoftSolver::group_by_colour() {
-  constexpr std::uint32_t kMany = 63;
+std::vector<std::uint32_t> SoftSolver::find_colours() {
   coloured_.clear();
-  for (const Pair& pair : pairs_) {
-    const std::uint32_t few = kMany - std::min(pair.contacts, kMany);
-    coloured_.push_back({pair.a, pair.b, shuffled(body_[pair.a], body_[pair.b]) % kColouredOrders, few});
+  for (const Pair& pair : pairs_)
+    coloured_.push_back({pair.a, pair.b, shuffled(body_[pair.a], body_[pair.b]) % kColouredOrders});
+  return dynamics::find_colours(coloured_, body_.size());
+}
+
+// Bodies of a region are near each other, and a thread that visits its pairs has them at hand. Result: of each
+// body.
+std::vector<std::uint32_t> SoftSolver::find_regions(const Step& step, std::uint32_t regions) const {
+  std::vector<std::uint32_t> out(body_.size());
+  if (regions == 1) return out;
+  const auto position = [&](std::uint32_t i, int axis) { return at(step.states[body_[i]].position, axis); };
+  std::vector<std::uint32_t> order = all_below(body_.size());
+  order.erase(order.begin());
+  int longest = 0;
+  double length = -1;
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto [low, high] = std::ranges::minmax(order, {}, [&](std::uint32_t i) { return position(i, axis); });
+    const double of_axis = position(high, axis) - position(low, axis);
+    if (of_axis > length) length = of_axis, longest = axis;
   }
-  const std::vector<std::uint32_t> colours = find_colours(coloured_, body_.size());
-  order_ = order_by_colour(coloured_, colours);
-  groups_.clear(), group_begin_.clear(), colour_begin_.clear();
+  std::ranges::sort(order, {}, [&](std::uint32_t i) { return position(i, longest); });
+  for (std::uint32_t region = 0; region < regions; ++region) {
+    const auto [begin, end] = part_of(order.size(), region, regions);
+    for (std::size_t k = begin; k < end; ++k) out[order[k]] = region;
+  }
+  return out;
+}
+
+// Gives each pair a place in a group of its colour and region, those with many contacts first, so that few places
+// of a group are empty.
+void SoftSolver::make_groups(const Step& step) {
+  constexpr std::uint32_t kMany = 63;
+  const std::uint32_t regions = step.input.threads.count();
+  const std::vector<std::uint32_t> colours = find_colours(), region_of = find_regions(step, regions);
+  const std::uint32_t colour_count = *std::ranges::max_element(colours) + 1;
+  const auto key = [&](std::uint32_t i) {
+    return colours[i] * regions + region_of[pairs_[i].a != 0 ? pairs_[i].a : pairs_[i].b];
+  };
+  order_ = sorted_by(all_below(pairs_.size()), kMany + 1,
+                     [&](std::uint32_t i) { return kMany - std::min(pairs_[i].contacts, kMany); });
+  order_ = sorted_by(order_, std::size_t{colour_count} * regions, key);
+  groups_.clear(), group_begin_.clear(), region_begin_.clear();
   std::uint32_t contacts = 0;
   for (std::uint32_t k = 0; k < order_.size(); ++k) {
     Pair& pair = pairs_[order_[k]];
-    const bool begins = k == 0 || colours[order_[k]] != colours[order_[k - 1]];
-    if (begins) colour_begin_.push_back(static_cast<std::uint32_t>(groups_.size()));
+    const bool begins = k == 0 || key(order_[k]) != key(order_[k - 1]);
+    while (region_begin_.size() <= key(order_[k])) region_begin_.push_back(static_cast<std::uint32_t>(groups_.size()));
     if (begins || groups_.back().pairs == kSoftWidth) {
       group_begin_.push_back(k);
       groups_.emplace_back().first = contacts;
@@ -144,31 +179,50 @@ void SoftSolver::group_by_colour() {
     contacts += pair.contacts > group.contacts ? pair.contacts - group.contacts : 0;
     group.contacts = std::max(group.contacts, pair.contacts);
   }
-  colour_begin_.push_back(static_cast<std::uint32_t>(groups_.size()));
+  region_begin_.resize(std::size_t{colour_count} * regions + 1, static_cast<std::uint32_t>(groups_.size()));
   group_begin_.push_back(static_cast<std::uint32_t>(order_.size()));
-  normals_.resize(contacts), frictions_.resize(contacts);
+  turnings_.resize(groups_.size());
+  normals_.resize(contacts), gaps_.resize(contacts), frictions_.resize(contacts);
+  find_parts(regions);
+}
+
+// A colour of many groups is a part, whose regions threads share. Others are one part, that one thread visits.
+void SoftSolver::find_parts(std::uint32_t regions) {
+  parts_.clear();
+  for (std::size_t c = 0; c + 1 < region_begin_.size(); c += regions) {
+    const std::uint32_t begin = region_begin_[c], end = region_begin_[c + regions];
+    if (end - begin >= kSharedGroups)
+      parts_.push_back({begin, end, &region_begin_[c]});
+    else if (!parts_.empty() && parts_.back().region_begin == nullptr)
+      parts_.back().end = end;
+    else
+      parts_.push_back({begin, end, nullptr});
+  }
 }
 
 void SoftSolver::fill(const Step& step) {
-  // What contacts do not move has a body for each pair, so that no two write the same one.
+  // Each group has a body of its own for what contacts do not move, so that no two threads write the same one.
   auto places = static_cast<std::uint32_t>(body_.size());
   for (SoftPairs& group : groups_) {
-    for (int lane = 0; lane < kSoftWidth; ++lane)
-      group.body_a[lane] = places++, group.body_b[lane] = places++;
+    std::ranges::fill(group.body_a, places), std::ranges::fill(group.body_b, places);
+    ++places;
   }
-  motions_.assign(places, SoftBody{});
+  velocities_.assign(places, SoftMotion{}), moved_.assign(places, SoftMotion{});
   bodies_.resize(body_.size()), gains_.resize(body_.size()), start_.resize(body_.size());
   bodies_[0] = {};
   Threads& threads = step.input.threads;
   threads.for_parts(body_.size() - 1, kBodiesAtOnce, [&](std::size_t before) {
     const std::size_t i = before + 1;
     bodies_[i] = step.rows.body(body_[i]);
-    put(step.h / bodies_[i].scale.root_mass * bodies_[i].gravity.linear, gains_[i].velocity);
+    put(step.h / bodies_[i].scale.root_mass * bodies_[i].gravity.linear, gains_[i].centre);
     put(step.h * bodies_[i].gravity.angular, gains_[i].spin);
   });
   threads.for_parts(groups_.size(), kGroupsAtOnce, [&](std::size_t group) {
-    std::fill_n(normals_.begin() + groups_[group].first, groups_[group].contacts, SoftNormal{});
-    std::fill_n(frictions_.begin() + groups_[group].first, groups_[group].contacts, SoftFriction{});
+    const auto clear = [&](auto& rows) {
+      std::fill_n(rows.begin() + groups_[group].first, groups_[group].contacts, typename std::decay_t<decltype(rows)>::value_type{});
+    };
+    clear(normals_), clear(gaps_), clear(frictions_);
+    turnings_[group] = {};
     for (std::uint32_t k = group_begin_[group]; k < group_begin_[group + 1]; ++k)
       fill_pair(step, pairs_[order_[k]]);
   });
@@ -178,34 +232,35 @@ void SoftSolver::fill_pair(const Step& step, const Pair& pair) {
   SoftPairs& group = groups_[pair.group];
   const int lane = pair.lane;
   const SteppedBody &a = bodies_[pair.a], &b = bodies_[pair.b];
-  const std::span<const std::uint32_t> contacts =
-      std::span(contacts_).subspan(pair.first_contact, pair.contacts);
+  const std::span<const std::uint32_t> contacts = std::span(contacts_).subspan(pair.first_contact, pair.contacts);
   const double substeps = step.options.substeps;
-  if (a.moves) group.body_a[lane] = pair.a, put(a.scale, group.spread_a, lane);
-  if (b.moves) group.body_b[lane] = pair.b, put(b.scale, group.spread_b, lane);
+  SoftTurning& turns = turnings_[pair.group];
+  if (a.moves) group.body_a[lane] = pair.a, put(a.scale, turns.spread_a, lane);
+  if (b.moves) group.body_b[lane] = pair.b, put(b.scale, turns.spread_b, lane);
   put(inverse_mass(a), group.inverse_mass_a, lane), put(inverse_mass(b), group.inverse_mass_b, lane);
   const Softness& soft = a.moves && b.moves ? step.between_movers : step.against_unmoved;
   put(soft.bias_rate, group.bias_rate, lane), put(soft.mass_scale, group.mass_scale, lane);
   put(soft.impulse_scale, group.impulse_scale, lane);
-  const Vector3 turns = b.scale.spread * b.velocity.angular - a.scale.spread * a.velocity.angular;
-  put(turns + step.rows.turning_drive(step.input.contacts[contacts[0]]), group.turn_drive, lane);
-  put(1 / turning_mobility(a, b), group.turn_mass, lane);
-  put(step.rows.material_of(step.input.contacts[contacts[0]]).rolling_resistance, group.lever, lane);
+  const Vector3 spin = b.scale.spread * b.velocity.angular - a.scale.spread * a.velocity.angular;
+  put(spin + step.rows.turning_drive(step.input.contacts[contacts[0]]), turns.drive, lane);
+  put(1 / turning_mobility(a, b), turns.mass, lane);
+  put(step.rows.material_of(step.input.contacts[contacts[0]]).rolling_resistance, turns.lever, lane);
   Vector3 turning;
   for (const std::uint32_t i : contacts) turning += step.impulses[i].turning;
-  put(turning / substeps, group.turn_impulse, lane);
+  put(turning / substeps, turns.impulse, lane);
   step.rows.add_contacts(contacts, a, b, step.impulses, [&](std::size_t i, const ContactRows& rows) {
     SoftNormal& normal = normals_[group.first + i];
     const Vector3& along = step.input.contacts[contacts[i]].normal;
     put(rows.normal, along, normal.direction, lane);
     put(1 / rows.normal.mobility(), normal.mass, lane);
     put(rows.drive.x + rows.speed(rows.normal, a.velocity, b.velocity), normal.drive, lane);
-    put(rows.separation, normal.separation, lane), put(rows.separation, normal.followed, lane);
-    put(opposed(step.input.contacts, contacts, along, rows.separation, step.options.slop), normal.opposed,
-        lane);
-    put(rows.rebound, normal.rebound, lane);
+    put(rows.separation, normal.followed, lane);
     put(rows.impulse.x / substeps, normal.impulse, lane);
-    if (rows.rebound > 0) group.bounces = true;
+    SoftGap& gap = gaps_[group.first + i];
+    const double less = opposed(step.input.contacts, contacts, along, rows.separation, step.options.slop);
+    put(rows.separation, gap.separation, lane), put(rows.rebound, gap.rebound, lane), put(less, gap.opposed, lane);
+    group.bounces = group.bounces || rows.rebound > 0;
+    group.is_opposed = group.is_opposed || less > 0;
     SoftFriction& friction = frictions_[group.first + i];
     put(rows.first, rows.first_direction, friction.first, lane);
     put(rows.second, rows.second_direction, friction.second, lane);
@@ -222,26 +277,20 @@ void SoftSolver::run(const Step& step) {
   constexpr int kRelaxingSweeps = 2, kRestitutionSweeps = 10;
   struct Phase {
     Work work;
-    std::uint32_t colour = 0;
+    SweepPart part = {};
     SoftPasses::Pass pass = nullptr;
     float time = 0;
   };
   std::vector<Phase> phases;
-  std::vector<std::uint32_t> parts;
-  const auto body_parts = static_cast<std::uint32_t>((body_.size() + kBodiesAtOnce - 1) / kBodiesAtOnce);
-  const auto add_bodies = [&](Work work) { phases.push_back({work}), parts.push_back(body_parts); };
   const auto add_sweep = [&](SoftPasses::Pass pass, double time = 0) {
-    for (std::uint32_t c = 0; c + 1 < colour_begin_.size(); ++c) {
-      phases.push_back({Work::pass, c, pass, static_cast<float>(time)});
-      parts.push_back((colour_begin_[c + 1] - colour_begin_[c] + kGroupsAtOnce - 1) / kGroupsAtOnce);
-    }
+    for (const SweepPart& part : parts_) phases.push_back({Work::pass, part, pass, static_cast<float>(time)});
   };
   static const SoftPasses& passes = *best_way<const SoftPasses*>(soft_passes);
   add_sweep(passes.start);
   for (std::uint32_t k = 0; k < step.options.substeps; ++k) {
-    add_bodies(k == 0 ? Work::begin : Work::accelerate);
+    phases.push_back({k == 0 ? Work::begin : Work::accelerate});
     add_sweep(passes.push);
-    add_bodies(Work::move);
+    phases.push_back({Work::move});
     add_sweep(passes.follow, (k + 1) * step.h);
     for (int sweep = 1; sweep < kRelaxingSweeps; ++sweep) add_sweep(passes.relax);
     add_sweep(passes.rub);
@@ -250,18 +299,19 @@ void SoftSolver::run(const Step& step) {
     for (int sweep = 0; sweep < kRestitutionSweeps; ++sweep) add_sweep(passes.rebound);
   }
   add_sweep(passes.judge);
-  const SoftRows rows = {motions_.data(), groups_.data(), normals_.data(), frictions_.data(),
-                         static_cast<float>(1 / step.h)};
-  run_phases(step.input.threads, parts, [&](std::size_t i, std::uint32_t part) {
-    const Phase& phase = phases[i];
-    if (phase.work == Work::pass) {
-      const std::uint32_t begin = colour_begin_[phase.colour] + part * kGroupsAtOnce;
-      phase.pass(rows, begin, std::min(begin + kGroupsAtOnce, colour_begin_[phase.colour + 1]), phase.time);
-      return;
+  const SoftRows rows = {velocities_.data(), moved_.data(), groups_.data(), turnings_.data(), normals_.data(),
+                         gaps_.data(),       frictions_.data(), static_cast<float>(1 / step.h)};
+  run_phases(step.input.threads, phases.size(), [&](std::size_t phase, std::uint32_t i, std::uint32_t n) {
+    const auto& [work, part, pass, time] = phases[phase];
+    if (work != Work::pass) {
+      const auto [begin, end] = part_of(body_.size(), i, n);
+      for (std::size_t j = begin; j < end; ++j) visit_body(j, work, static_cast<float>(step.h));
+    } else if (part.region_begin != nullptr) {
+      for (std::uint32_t region = i; region < step.input.threads.count(); region += n)
+        pass(rows, part.region_begin[region], part.region_begin[region + 1], time);
+    } else if (i == 0) {
+      pass(rows, part.begin, part.end, time);
     }
-    const std::size_t begin = part * kBodiesAtOnce;
-    for (std::size_t j = begin; j < std::min(begin + kBodiesAtOnce, body_.size()); ++j)
-      visit_body(j, phase.work, static_cast<float>(step.h));
   });
 }
 
@@ -276,48 +326,42 @@ void SoftSolver::visit_body(std::size_t i, Work work, float h) {
     start = (work == Work::begin ? 0 : velocity) + gain;
     velocity = start + pushed;
   };
-  SoftBody& motion = motions_[i];
   for (int k = 0; k < 3; ++k) {
-    visit(gains_[i].velocity[k], start_[i].velocity[k], motion.velocity[k], motion.moved[k]);
-    visit(gains_[i].spin[k], start_[i].spin[k], motion.spin[k], motion.turned[k]);
+    visit(gains_[i].centre[k], start_[i].centre[k], velocities_[i].centre[k], moved_[i].centre[k]);
+    visit(gains_[i].spin[k], start_[i].spin[k], velocities_[i].spin[k], moved_[i].spin[k]);
   }
 }
 
-void SoftSolver::write(const Step& step, std::span<BodyState> states,
-                       std::span<ContactImpulse> impulses) const {
+void SoftSolver::write(const Step& step, std::span<BodyState> states, std::span<ContactImpulse> impulses) const {
   step.input.threads.for_parts(body_.size() - 1, kBodiesAtOnce, [&](std::size_t before) {
     const std::size_t i = before + 1;
-    const SoftBody& motion = motions_[i];
     const SteppedBody& body = bodies_[i];
-    Vector6 velocity = body.velocity, displacement = step.input.dt * body.velocity;
-    velocity += {body.scale.root_mass * first_three(motion.velocity), first_three(motion.spin)};
-    displacement += {body.scale.root_mass * first_three(motion.moved), first_three(motion.turned)};
-    apply_motion(step.input.bodies[body_[i]], body.scale, velocity, displacement, step.input.dt,
-                 states[body_[i]]);
+    const auto added = [&](const SoftMotion& motion) {
+      return Vector6{body.scale.root_mass * first_three(motion.centre), first_three(motion.spin)};
+    };
+    apply_motion(step.input.bodies[body_[i]], body.scale, body.velocity + added(velocities_[i]),
+                 step.input.dt * body.velocity + added(moved_[i]), step.input.dt, states[body_[i]]);
   });
   const double substeps = step.options.substeps;
   step.input.threads.for_parts(pairs_.size(), kBodiesAtOnce, [&](std::size_t k) {
     const Pair& pair = pairs_[k];
-    const SoftNumber(&turns)[3] = groups_[pair.group].turn_impulse;
-    const Vector3 turning = {turns[0].of[pair.lane], turns[1].of[pair.lane], turns[2].of[pair.lane]};
+    const SoftNumber(&turns)[3] = turnings_[pair.group].impulse;
+    const auto of = [&](const SoftNumber& number) { return unsigned_zero(number.of[pair.lane]); };
+    const Vector3 turning = {of(turns[0]), of(turns[1]), of(turns[2])};
     for (std::uint32_t i = 0; i < pair.contacts; ++i) {
       const std::uint32_t contact = contacts_[pair.first_contact + i], row = groups_[pair.group].first + i;
       const auto [first, second] = Tangents(step.input.contacts[contact].normal);
-      const double along_first = frictions_[row].first_impulse.of[pair.lane],
-                   along_second = frictions_[row].second_impulse.of[pair.lane];
-      impulses[contact] = {substeps * normals_[row].impulse.of[pair.lane],
-                           substeps * (along_first * first + along_second * second),
-                           substeps / pair.contacts * turning};
+      impulses[contact] = {
+          substeps * of(normals_[row].impulse),
+          substeps * (of(frictions_[row].first_impulse) * first + of(frictions_[row].second_impulse) * second),
+          substeps / pair.contacts * turning};
     }
   });
 }
 
 Residual SoftSolver::residual() const {
   Residual out;
-  for (const SoftPairs& group : groups_) {
-    for (std::uint32_t lane = 0; lane < group.pairs; ++lane)
-      out.add(Residual{group.largest_residual.of[lane], group.residual_squares.of[lane]});
-  }
+  for (const SoftPairs& group : groups_) out.add(Residual{group.largest_residual, group.residual_squares});
   return out;
 }
 

@@ -41,16 +41,20 @@ class SoftSolver {
   struct Softness {
     double bias_rate, mass_scale, impulse_scale;
   };
-  /// Velocities of a body, as SoftBody has them.
-  struct Velocities {
-    float velocity[4], spin[4];
+  /// The groups of a colour, region by region, or those of several that one thread visits.
+  struct SweepPart {
+    std::uint32_t begin, end;
+    const std::uint32_t* region_begin;  ///< null: of several colours
   };
   enum class Work : std::uint8_t { pass, begin, accelerate, move };
   struct Step;
 
   static Softness softness(double frequency, double damping_ratio, double h);
   void gather(const Step& step, std::span<const std::uint32_t> islands);
-  void group_by_colour();
+  std::vector<std::uint32_t> find_colours();
+  std::vector<std::uint32_t> find_regions(const Step& step, std::uint32_t regions) const;
+  void make_groups(const Step& step);
+  void find_parts(std::uint32_t regions);
   void fill(const Step& step);
   void fill_pair(const Step& step, const Pair& pair);
   void run(const Step& step);
@@ -67,12 +71,15 @@ class SoftSolver {
   std::vector<ColouredPair> coloured_;
   std::vector<std::uint32_t> order_;         // of pairs, group by group
   std::vector<std::uint32_t> group_begin_;   // in order_
-  std::vector<std::uint32_t> colour_begin_;  // of its groups
+  std::vector<std::uint32_t> region_begin_;  // of its groups, for each colour
+  std::vector<SweepPart> parts_;
   std::vector<SoftPairs> groups_;
+  std::vector<SoftTurning> turnings_;
   std::vector<SoftNormal> normals_;
+  std::vector<SoftGap> gaps_;
   std::vector<SoftFriction> frictions_;
-  std::vector<SoftBody> motions_;          // what the step adds to the motion of its start
-  std::vector<Velocities> gains_, start_;  // what a substep adds to each; the velocities without its contacts
+  std::vector<SoftMotion> velocities_, moved_;  // what the step adds to the motion of its start
+  std::vector<SoftMotion> gains_, start_;       // what a substep adds to each; the velocities without its contacts
 };
 
 }  // namespace tandem::dynamics

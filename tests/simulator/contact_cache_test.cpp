@@ -34,8 +34,9 @@ struct BoxOnSlab {
       poses.push_back(pose_of(bodies[i], states[i]));
       radii.push_back(bodies[i].radius);
     }
-    cache.update(found, judge.kept(pairs, poses, radii, kReach), bodies, states, idle,
-                 std::vector<double>(bodies.size(), kGap));
+    const double g = 9.81, dt = std::sqrt(kGap / (2 * g));
+    const std::vector<Pull> pulls(bodies.size(), {{0, 0, -g}, {}});
+    cache.update(found, judge.kept(pairs, poses, radii, kReach), {bodies, states, idle, dt, pulls, kReach});
     return {cache.contacts().begin(), cache.contacts().end()};
   }
 

@@ -1,0 +1,54 @@
+#pragma once
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <span>
+
+#include "dynamics/contact_point.h"
+#include "tandem/kernels/object_pair.h"
+
+namespace tandem::dynamics {
+
+/// Bodies before a step, and what bounds how near they come to each other in it.
+struct BodiesAhead {
+  std::span<const BodyProperties> bodies;
+  std::span<const BodyState> states;
+  std::span<const std::uint8_t> idle;  ///< empty, or one for each body
+  double dt;
+  std::span<const Pull> pulls;  ///< of each body
+  double slop;
+
+  bool is_idle(std::uint32_t body) const { return !idle.empty() && idle[body] != 0; }
+
+  /// Returns how far two bodies may fall towards each other along a unit vector: as far as contacts give one of
+  /// them what gravity and forces give, and as much to the other.
+  double fall_along(const ObjectPair& pair, const Vector3& direction) const {
+    const Pull &a = pulls[pair.a], &b = pulls[pair.b];
+    const double pull = std::max(std::fabs(dot(a.linear, direction)), std::fabs(dot(b.linear, direction)));
+    return kFall * (pull + a.turning + b.turning) * dt * dt;
+  }
+  double fall(const ObjectPair& pair) const { return std::max(fall(pair.a), fall(pair.b)); }
+  double fall(std::uint32_t body) const { return kFall * pulls[body].most() * dt * dt; }
+
+  /// A length in which contacts are told well.
+  double overlap() const { return 0.5 * slop; }
+
+  /// Returns whether a contact is a gap that the step will not close.
+  bool is_far(const ContactPoint& contact) const {
+    if (contact.depth >= -overlap()) return false;
+    const double approach = -dot(contact.normal, velocity_at(contact.body_b, contact.position) -
+                                                     velocity_at(contact.body_a, contact.position));
+    return -contact.depth > dt * (approach > 0 ? approach : 0) + fall_along({contact.body_a, contact.body_b}, contact.normal) + overlap();
+  }
+
+ private:
+  static constexpr double kFall = 2;
+
+  Vector3 velocity_at(std::uint32_t body, const Vector3& point) const {
+    if (is_idle(body)) return {};
+    const BodyState& state = states[body];
+    return state.velocity + cross(state.angular_velocity, point - state.position);
+  }
+};
+
+}  // namespace tandem::dynamics

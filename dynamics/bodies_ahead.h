@@ -18,9 +18,11 @@ struct BodiesAhead {
 
   bool is_idle(std::uint32_t body) const { return !idle.empty() && idle[body] != 0; }
 
-  /// Returns how far two bodies may fall towards each other along a unit vector: as far as contacts give one of
-  /// them what gravity gives, and as much to the other.
-  double fall_along(const Vector3& direction) const { return kFall * std::fabs(dot(gravity, direction)) * dt * dt; }
+  /// Returns how far two bodies may fall towards each other along a unit vector: as far as contacts give one
+  /// of them what gravity gives, and as much to the other.
+  double fall_along(const Vector3& direction) const {
+    return kFall * std::fabs(dot(gravity, direction)) * dt * dt;
+  }
   double fall() const { return kFall * norm(gravity) * dt * dt; }
 
   /// A length in which contacts are told well.

@@ -18,7 +18,7 @@ struct ContactRow {
 /// Turns velocities of a body into those in which its mass is 1: y = (sqrt(m) v, F^-1 spin), where F F^T is
 /// the inverse of the inertia. Kinetic energy is |y|^2 / 2.
 struct MassScale {
-  double root_mass = 1;
+  double root_mass = 1, inverse_root_mass = 1;
   Matrix3 spread = Matrix3::identity();  ///< F
 };
 
@@ -62,8 +62,8 @@ class RowMaker {
   SteppedBody body(std::uint32_t body) const;
   bool is_moved(std::uint32_t body) const { return input_.bodies[body].motion == Motion::moving; }
 
-  /// Calls add(i, rows) for each contact of a pair, by place in `contacts`. a, b: its bodies. impulses: of all
-  /// contacts of the step.
+  /// Calls add(i, rows) for each contact of a pair, by place in `contacts`. a, b: its bodies. impulses: of
+  /// all contacts of the step.
   template <typename Add>
   void add_contacts(std::span<const std::uint32_t> contacts, const SteppedBody& a, const SteppedBody& b,
                     std::span<const ContactImpulse> impulses, const Add& add) const {
@@ -96,7 +96,8 @@ class RowMaker {
   const SolverOptions& options_;
 };
 
-/// Returns by how much an impulse of 1 about any axis changes how the bodies turn against each other, at most.
+/// Returns by how much an impulse of 1 about any axis changes how the bodies turn against each other, at
+/// most.
 double turning_mobility(const SteppedBody& a, const SteppedBody& b);
 
 /// Moves a body by a displacement and gives it a velocity, both as y.

@@ -31,7 +31,8 @@ class ProblemMaker {
       const ContactPoint& contact = contact_of(begin);
       const ObjectPair pair = {contact.body_a, contact.body_b};
       while (end < count && ObjectPair{contact_of(end).body_a, contact_of(end).body_b} == pair) ++end;
-      add_pair(begin, end, rows_.is_moved(pair.a) ? place[pair.a] : 0, rows_.is_moved(pair.b) ? place[pair.b] : 0);
+      add_pair(begin, end, rows_.is_moved(pair.a) ? place[pair.a] : 0,
+               rows_.is_moved(pair.b) ? place[pair.b] : 0);
     }
     return std::move(problem_);
   }
@@ -64,14 +65,16 @@ class ProblemMaker {
     }
     const std::span<const std::uint32_t> contacts = std::span(problem_.contacts).subspan(begin, end - begin);
     for (const std::uint32_t contact : contacts) pair.impulse += impulses_[contact].turning;
-    rows_.add_contacts(contacts, bodies_[a], bodies_[b], impulses_, [&](std::size_t k, const ContactRows& rows) {
-      const std::size_t i = begin + k;
-      problem_.a[i] = a, problem_.b[i] = b;
-      problem_.normal[i] = rows.normal, problem_.first[i] = rows.first, problem_.second[i] = rows.second;
-      problem_.first_direction[i] = rows.first_direction, problem_.second_direction[i] = rows.second_direction;
-      problem_.drive[i] = rows.drive, problem_.impulse[i] = rows.impulse;
-      problem_.separation[i] = rows.separation, problem_.rebound[i] = rows.rebound;
-    });
+    rows_.add_contacts(
+        contacts, bodies_[a], bodies_[b], impulses_, [&](std::size_t k, const ContactRows& rows) {
+          const std::size_t i = begin + k;
+          problem_.a[i] = a, problem_.b[i] = b;
+          problem_.normal[i] = rows.normal, problem_.first[i] = rows.first, problem_.second[i] = rows.second;
+          problem_.first_direction[i] = rows.first_direction,
+          problem_.second_direction[i] = rows.second_direction;
+          problem_.drive[i] = rows.drive, problem_.impulse[i] = rows.impulse;
+          problem_.separation[i] = rows.separation, problem_.rebound[i] = rows.rebound;
+        });
     problem_.pairs.push_back(pair);
   }
 
@@ -93,10 +96,10 @@ std::vector<std::uint32_t> from_the_ground_up(std::span<const std::uint32_t> thi
 }  // namespace
 
 IslandProblem make_island_problem(const StepInput& input, std::size_t island, const StepStart& start,
-                                   const SolverOptions& options, std::span<const std::uint32_t> layers,
-                                   std::span<std::uint32_t> place) {
-  const auto bodies = from_the_ground_up(input.islands.bodies_of(island),
-                                         [&](std::uint32_t body) { return layers[body]; });
+                                  const SolverOptions& options, std::span<const std::uint32_t> layers,
+                                  std::span<std::uint32_t> place) {
+  const auto bodies =
+      from_the_ground_up(input.islands.bodies_of(island), [&](std::uint32_t body) { return layers[body]; });
   const auto contacts = from_the_ground_up(input.islands.contacts_of(island), [&](std::uint32_t i) {
     return std::min(layers[input.contacts[i].body_a], layers[input.contacts[i].body_b]);
   });

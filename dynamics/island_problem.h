@@ -69,8 +69,8 @@ struct IslandProblem {
   }
 };
 
-/// What a contact leaves undone. target: of the velocity along the normal. share: part of the problem's impulses
-/// that the law is asked of.
+/// What a contact leaves undone. target: of the velocity along the normal. share: part of the problem's
+/// impulses that the law is asked of.
 Residual residual_of(const IslandProblem& problem, std::size_t contact, double target, double friction,
                      double share);
 
@@ -83,8 +83,8 @@ struct StepStart {
 /// Bodies and contacts come by ascending layer (find_layers()), these of their lower
 /// body: from the ground up. place: for each body of the step a number that this may change.
 IslandProblem make_island_problem(const StepInput& input, std::size_t island, const StepStart& start,
-                                   const SolverOptions& options, std::span<const std::uint32_t> layers,
-                                   std::span<std::uint32_t> place);
+                                  const SolverOptions& options, std::span<const std::uint32_t> layers,
+                                  std::span<std::uint32_t> place);
 
 /// Moves the island's bodies by the displacement, gives them the velocities, and hands out the impulses.
 void apply_solution(const IslandProblem& problem, const StepInput& input, std::span<BodyState> states,

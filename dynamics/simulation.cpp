@@ -52,15 +52,17 @@ StepRecord Simulation::step() {
 void Simulation::find_contacts(StepRecord& record) {
   const std::vector<std::uint8_t> idle = this->idle();
   const BodiesAhead ahead = {acting_, states_, idle, options_.dt, options_.gravity, options_.solver.slop};
-  std::vector<ObjectPair> remembered = cache_.pairs();
+  const std::vector<ObjectPair> touching = cache_.pairs();
+  Keeping keeping = {touching, options_.solver.slop};
   Stopwatch stopwatch;
+  std::vector<ObjectPair> remembered;
   if (parts_.ahead) {
-    const std::vector<ObjectPair> touching = std::move(remembered);
-    remembered.clear();
-    std::ranges::set_union(touching, parts_.ahead->find_near(ahead), std::back_inserter(remembered));
+    parts_.ahead->find_near(ahead);
+    std::ranges::set_union(keeping.remembered, parts_.ahead->slow(), std::back_inserter(remembered));
+    keeping.remembered = remembered, keeping.near = parts_.ahead->fast();
   }
   const double near_seconds = stopwatch.lap();
-  found_ = parts_.contacts->find(poses(), idle, {remembered, options_.solver.slop});
+  found_ = parts_.contacts->find(poses(), idle, keeping);
   take(record, parts_.contacts->report());
   stopwatch.lap();
   if (parts_.ahead) parts_.ahead->add_to(found_, parts_.contacts->kept(), ahead);

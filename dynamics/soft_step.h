@@ -18,14 +18,14 @@ namespace tandem::dynamics {
 /// not move), taken implicitly: it gives way to what one sweep cannot solve, and its push never becomes
 /// speed, because the relaxing sweeps take it back.
 ///
-/// Pairs of bodies have colours, and no two of one colour move the same body: a sweep goes colour by colour, and
-/// solves the pairs of a colour side by side. Impulses and velocities are float32, these less those at the start
-/// of the step.
+/// Pairs of bodies have colours, and no two of one colour move the same body: a sweep goes colour by colour,
+/// and solves the pairs of a colour side by side. Impulses and velocities are float32, these less those at
+/// the start of the step.
 class SoftSolver {
  public:
   /// Solves the contacts of islands together. states: those at the start of the step, and then at its end.
-  /// impulses: those of all contacts, to start with and then the solution. Result: what the last substep leaves
-  /// undone.
+  /// impulses: those of all contacts, to start with and then the solution. Result: what the last substep
+  /// leaves undone.
   Residual solve(const StepInput& input, std::span<const std::uint32_t> islands, const SolverOptions& options,
                  std::span<BodyState> states, std::span<ContactImpulse> impulses);
 
@@ -62,7 +62,8 @@ class SoftSolver {
   void write(const Step& step, std::span<BodyState> states, std::span<ContactImpulse> impulses) const;
   Residual residual() const;
 
-  // Kept from step to step for their memory alone. The first of bodies stands for all that contacts do not move.
+  // Kept from step to step for their memory alone. The first of bodies stands for all that contacts do not
+  // move.
   std::vector<std::uint32_t> body_, place_;  // of each place, and of each body of the step
   std::vector<SteppedBody> bodies_;
   std::vector<std::uint32_t> contacts_;
@@ -78,7 +79,7 @@ class SoftSolver {
   std::vector<SoftGap> gaps_;
   std::vector<SoftFriction> frictions_;
   std::vector<SoftMotion> velocities_, moved_;  // what the step adds to the motion of its start
-  std::vector<SoftMotion> gains_, start_;       // what a substep adds to each; the velocities without its contacts
+  std::vector<SoftMotion> gains_, start_;  // what a substep adds to each; the velocities without its contacts
 };
 
 }  // namespace tandem::dynamics

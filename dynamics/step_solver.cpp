@@ -33,7 +33,8 @@ bool is_slender(const Islands& islands, std::size_t island, std::span<const std:
   return work <= kForAContact * static_cast<double>(islands.contacts_of(island).size());
 }
 
-// Solves islands by Newton's method each by itself, and all others together; bodies that no contact holds fly.
+// Solves islands by Newton's method each by itself, and all others together; bodies that no contact holds
+// fly.
 class IslandSolver final : public StepSolver {
  public:
   explicit IslandSolver(const SolverOptions& options) : options_(options) {}
@@ -67,8 +68,8 @@ class IslandSolver final : public StepSolver {
         advance(input.bodies[i], states[i], Vector3{}, Vector3{}, input.dt);
     }
     sum_up(input.islands, all);
-    statistics_.newton_islands =
-        static_cast<std::uint64_t>(std::ranges::count_if(by_newton, [](const auto& of) { return of.has_value(); }));
+    statistics_.newton_islands = static_cast<std::uint64_t>(
+        std::ranges::count_if(by_newton, [](const auto& of) { return of.has_value(); }));
   }
 
  private:
@@ -91,8 +92,7 @@ void StepSolver::sum_up(const Islands& islands, const Residual& residual) {
   statistics_.contacts = islands.contacts.size();
   if (statistics_.contacts == 0) return;
   statistics_.residual = residual.largest;
-  statistics_.residual_rms =
-      std::sqrt(residual.squares / (3 * static_cast<double>(statistics_.contacts)));
+  statistics_.residual_rms = std::sqrt(residual.squares / (3 * static_cast<double>(statistics_.contacts)));
 }
 
 std::unique_ptr<StepSolver> make_step_solver(const SolverOptions& options) {

@@ -35,7 +35,8 @@ struct BoxOnSlab {
       radii.push_back(bodies[i].radius);
     }
     const double g = 9.81, dt = std::sqrt(kGap / (2 * g));
-    cache.update(found, judge.kept(pairs, poses, radii, kReach), {bodies, states, idle, dt, {0, 0, -g}, kReach});
+    cache.update(found, judge.kept(pairs, poses, radii, kReach),
+                 {bodies, states, idle, dt, {0, 0, -g}, kReach});
     return {cache.contacts().begin(), cache.contacts().end()};
   }
 

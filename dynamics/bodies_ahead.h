@@ -20,8 +20,8 @@ struct BodiesAhead {
 
   bool is_idle(std::uint32_t body) const { return !idle.empty() && idle[body] != 0; }
 
-  /// Returns how far two bodies may fall towards each other along a unit vector: as far as contacts give one of
-  /// them what gravity and forces give, and as much to the other.
+  /// Returns how far two bodies may fall towards each other along a unit vector: as far as contacts give one
+  /// of them what gravity and forces give, and as much to the other.
   double fall_along(const ObjectPair& pair, const Vector3& direction) const {
     const Pull &a = pulls[pair.a], &b = pulls[pair.b];
     const double pull = std::max(std::fabs(dot(a.linear, direction)), std::fabs(dot(b.linear, direction)));
@@ -38,7 +38,8 @@ struct BodiesAhead {
     if (contact.depth >= -overlap()) return false;
     const double approach = -dot(contact.normal, velocity_at(contact.body_b, contact.position) -
                                                      velocity_at(contact.body_a, contact.position));
-    return -contact.depth > dt * (approach > 0 ? approach : 0) + fall_along({contact.body_a, contact.body_b}, contact.normal) + overlap();
+    return -contact.depth > dt * (approach > 0 ? approach : 0) +
+                                fall_along({contact.body_a, contact.body_b}, contact.normal) + overlap();
   }
 
  private:

@@ -159,7 +159,9 @@ void ContactCache::renew(std::span<const CachedContact> old, std::span<const Con
     const ContactPoint moved = moved_with_bodies(entry, of.states);
     const auto is_near = [&](const ContactPoint& one) { return norm(one.position - moved.position) <= near; };
     const auto others = std::span(contacts_).subspan(first_contact);
-    if (!is_just_lost(entry, moved, of.states, of.fall(entry.pair), near) || std::ranges::any_of(others, is_near)) continue;
+    if (!is_just_lost(entry, moved, of.states, of.fall(entry.pair), near) ||
+        std::ranges::any_of(others, is_near))
+      continue;
     entry.impulse = {};
     add(entry, moved);
   }

@@ -28,10 +28,11 @@ class ContactCache {
   std::vector<ObjectPair> pairs() const;
 
   /// Makes the contacts of a step. Pairs that are kept have those remembered, moved with the bodies; these
-  /// may have become gaps, and are left out while the step will not close them. All others have those found, and
-  /// those just lost: remembered ones that are gaps along the normal of at most the pair's `fall()`, slid by at most a fiftieth of the smaller body's radius, with no other
-  /// contact of the pair that near, for at most eight steps since they pushed. Without these a body that
-  /// comes off by a hair falls freely for a whole step, and deeper than it was.
+  /// may have become gaps, and are left out while the step will not close them. All others have those found,
+  /// and those just lost: remembered ones that are gaps along the normal of at most the pair's `fall()`, slid
+  /// by at most a fiftieth of the smaller body's radius, with no other contact of the pair that near, for at
+  /// most eight steps since they pushed. Without these a body that comes off by a hair falls freely for a
+  /// whole step, and deeper than it was.
   ///
   /// These contacts start with the impulse of the remembered one of the pair that has the same feature, or
   /// else of the nearest one within a tenth of the smaller body's radius; each is given once. What then is

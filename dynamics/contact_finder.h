@@ -1,5 +1,6 @@
 #pragma once
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -50,8 +51,11 @@ struct FinderReport {
 
 /// Says which pairs keep the contacts that they have.
 struct Keeping {
-  std::span<const ObjectPair> remembered;  ///< whose contacts the caller remembers, ascending
-  double tolerance;  ///< a pair keeps them until it has moved by more than this, see MovedQuery
+  std::span<const ObjectPair> remembered;  ///< of which the caller remembers what was found, ascending
+  double tolerance;  ///< a pair keeps that until it has moved by more than this, see MovedQuery
+  std::optional<std::span<const ObjectPair>> near = {};  ///< all others that may touch, ascending, where the
+                                                         ///< caller knows; else those whose boxes meet, and
+                                                         ///< they too are kept
 };
 
 /// A simulation has its contacts from one of these.
@@ -66,8 +70,7 @@ class ContactFinder {
                                                 std::span<const std::uint8_t> idle,
                                                 const Keeping& keeping) = 0;
 
-  /// Returns the pairs of the last call that keep the contacts that they had: whose boxes meet, or that were
-  /// remembered. Ascending.
+  /// Returns the pairs of the last call that keep what was found of them, ascending.
   std::span<const ObjectPair> kept() const { return kept_; }
 
   /// Return what the next call takes the motion of pairs from, and let it go on from there.
@@ -78,15 +81,16 @@ class ContactFinder {
   const FinderReport& report() const { return report_; }
 
  protected:
-  /// Finds the pairs, of those near each other and those remembered, that have moved; kept_ becomes the rest.
-  std::span<const ObjectPair> find_moved(Scene& scene, MovedQuery& moved, std::span<const ObjectPair> near,
+  /// Finds the pairs to ask about; kept_ becomes those that keep what was found. meeting: pairs whose boxes
+  /// meet, looked at where the caller does not know what is near.
+  std::span<const ObjectPair> find_moved(Scene& scene, MovedQuery& moved, std::span<const ObjectPair> meeting,
                                          const Keeping& keeping);
 
   FinderReport report_;
   std::vector<ObjectPair> kept_;
 
  private:
-  std::vector<ObjectPair> pairs_;
+  std::vector<ObjectPair> pairs_, asked_;
 };
 
 }  // namespace tandem::dynamics

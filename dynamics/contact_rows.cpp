@@ -12,7 +12,7 @@ Vector6 scaled(const MassScale& scale, const Vector3& velocity, const Vector3& s
 
 Vector6 gradient(const SteppedBody& body, const Vector3& direction, const Vector3& arm) {
   if (!body.moves) return {};
-  return {direction / body.scale.root_mass, transposed(body.scale.spread) * cross(arm, direction)};
+  return {body.scale.inverse_root_mass * direction, transposed(body.scale.spread) * cross(arm, direction)};
 }
 
 }  // namespace
@@ -21,7 +21,8 @@ SteppedBody RowMaker::body(std::uint32_t body) const {
   const BodyState& state = states_[body];
   SteppedBody out;
   out.moves = true;
-  out.scale = {std::sqrt(input_.bodies[body].mass),
+  const double root_mass = std::sqrt(input_.bodies[body].mass);
+  out.scale = {root_mass, 1 / root_mass,
                matrix_of(state.orientation) * cholesky(input_.bodies[body].inverse_inertia)};
   out.velocity = scaled(out.scale, state.velocity, state.angular_velocity);
   out.gravity = scaled(out.scale, input_.pulls[body].linear, input_.pulls[body].angular);

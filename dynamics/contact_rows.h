@@ -18,7 +18,7 @@ struct ContactRow {
 /// Turns velocities of a body into those in which its mass is 1: y = (sqrt(m) v, F^-1 spin), where F F^T is
 /// the inverse of the inertia. Kinetic energy is |y|^2 / 2.
 struct MassScale {
-  double root_mass = 1;
+  double root_mass = 1, inverse_root_mass = 1;
   Matrix3 spread = Matrix3::identity();  ///< F
 };
 

@@ -11,6 +11,15 @@ namespace {
 // pass by each other, a plane between them says too much about what lies ahead.
 constexpr double kFarthest = 0.25;
 
+// More than a million steps may make of rounding errors in the distance of two bodies.
+double rounding_of(const BodiesAhead& of, const ObjectPair& pair) {
+  constexpr double kOfSize = 1e-9;
+  const auto size = [&](std::uint32_t body) {
+    return norm(of.states[body].position) + of.bodies[body].radius;
+  };
+  return kOfSize * (size(pair.a) + size(pair.b));
+}
+
 bool comes_before(const ContactPoint& p, const ContactPoint& q) {
   return ObjectPair{p.body_a, p.body_b} < ObjectPair{q.body_a, q.body_b};
 }
@@ -26,11 +35,11 @@ ContactsAhead::ContactsAhead(std::span<const AssetView> assets, std::uint32_t th
   }
 }
 
-std::span<const ObjectPair> ContactsAhead::find_near(const BodiesAhead& of) {
+void ContactsAhead::find_near(const BodiesAhead& of) {
   place(of);
   follow(of);
   require(scene_.find_pairs(farthest(of)), scene_);
-  now_apart_.clear(), slow_.clear();
+  now_apart_.clear(), slow_.clear(), fast_.clear();
   auto before = apart_.begin();
   for (const ObjectPair& pair : scene_.pairs()) {
     while (before != apart_.end() && before->pair < pair) ++before;
@@ -39,12 +48,15 @@ std::span<const ObjectPair> ContactsAhead::find_near(const BodiesAhead& of) {
       now.distance = before->distance - (way_[pair.a] + way_[pair.b]) * (1 + 1e-9);
     const double way = of.dt * (norm(approach_of(pair, of.states)) + turning_of(pair));
     const double margin = of.fall(pair) + of.overlap();
-    now.reach = std::min(way + margin, kFarthest * std::min(of.bodies[pair.a].radius, of.bodies[pair.b].radius));
+    now.reach =
+        std::min(way + margin, kFarthest * std::min(of.bodies[pair.a].radius, of.bodies[pair.b].radius));
     now.slow = way <= of.slop;
-    if (now.slow) slow_.push_back(pair);
+    if (now.slow)
+      slow_.push_back(pair);
+    else if (!(now.distance > rounding_of(of, pair)))
+      fast_.push_back(pair);
   }
   apart_.swap(now_apart_);
-  return slow_;
 }
 
 void ContactsAhead::add_to(std::vector<ContactPoint>& found, std::span<const ObjectPair> kept,

@@ -20,10 +20,14 @@ class ContactsAhead {
   /// at. Throws QueryFailed.
   ContactsAhead(std::span<const AssetView> assets, std::uint32_t threads, const PairFilter& filter = {});
 
-  /// Finds which bodies are near each other. Result: the pairs of these whose points move against each other by
-  /// no more than the slop in this step, ascending; valid until the next call. Such a pair keeps what is known
-  /// of it until it has moved by more than that. Throws QueryFailed.
-  std::span<const ObjectPair> find_near(const BodiesAhead& of);
+  /// Finds which bodies are near each other. Throws QueryFailed.
+  void find_near(const BodiesAhead& of);
+
+  /// Return the pairs that are near each other, ascending, until the next find_near(). Slow: points move
+  /// against each other by no more than the slop in this step, so that a pair keeps what was found of it
+  /// until it has moved by more than that. Fast: the others, but for those that surely do not touch.
+  std::span<const ObjectPair> slow() const { return slow_; }
+  std::span<const ObjectPair> fast() const { return fast_; }
 
   /// Adds the contacts ahead of pairs to those found, so that these still come by ascending pair. Pairs that
   /// have contacts, slow ones that are kept, and those of two idle bodies have none. The result depends on
@@ -66,7 +70,7 @@ class ContactsAhead {
   std::vector<BodyState> before_;  // of the last call
   std::vector<double> way_;        // that points of each body have moved since then, at most
   std::vector<Apart> apart_, now_apart_;
-  std::vector<ObjectPair> slow_;
+  std::vector<ObjectPair> slow_, fast_;
   std::vector<Motion> motion_;
   std::vector<double> turning_;  // how fast points of each body move by its spin, at most
   std::vector<Instance> instances_;

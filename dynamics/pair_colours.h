@@ -13,16 +13,18 @@ struct ColouredPair {
 };
 inline constexpr std::uint32_t kColouredOrders = 1 << 16;
 
-/// Returns a colour for each pair: no two pairs of a colour have a body in common, but for 0. Each pair has the
-/// first colour that those before it have left; so the colours of an island do not depend on what else there is.
-/// A pair that finds none below kSharedColours has a colour of its own. bodies: all places are below.
+/// Returns a colour for each pair: no two pairs of a colour have a body in common, but for 0. Each pair has
+/// the first colour that those before it have left; so the colours of an island do not depend on what else
+/// there is. A pair that finds none below kSharedColours has a colour of its own. bodies: all places are
+/// below.
 std::vector<std::uint32_t> find_colours(std::span<const ColouredPair> pairs, std::size_t bodies);
 
 inline constexpr std::uint32_t kSharedColours = 128;
 
 /// Returns the things by ascending key, each below `keys`; equal ones keep their order.
 template <typename Key>
-std::vector<std::uint32_t> sorted_by(std::span<const std::uint32_t> things, std::size_t keys, const Key& key) {
+std::vector<std::uint32_t> sorted_by(std::span<const std::uint32_t> things, std::size_t keys,
+                                     const Key& key) {
   std::vector<std::uint32_t> next(keys + 1), out(things.size());
   for (const std::uint32_t thing : things) ++next[key(thing) + 1];
   std::partial_sum(next.begin(), next.end(), next.begin());

@@ -18,9 +18,9 @@ inline PhasePart part_of(std::size_t things, std::uint32_t i, std::uint32_t n) {
   return {things * i / n, things * (i + 1) / n};
 }
 
-/// Calls work(phase, i, n) for each phase below `phases` and i below n, phase after phase: a phase begins when
-/// all calls of the one before have ended, and calls of one phase run side by side. n is how many threads come at
-/// once, and the same in all phases. They must not throw.
+/// Calls work(phase, i, n) for each phase below `phases` and i below n, phase after phase: a phase begins
+/// when all calls of the one before have ended, and calls of one phase run side by side. n is how many
+/// threads come at once, and the same in all phases. They must not throw.
 template <typename Work>
 void run_phases(Threads& threads, std::size_t phases, const Work& work) {
   if (threads.count() == 1) {
@@ -44,7 +44,8 @@ void run_phases(Threads& threads, std::size_t phases, const Work& work) {
     const auto i = static_cast<std::uint32_t>(before);
     if (i == 0) {
       constexpr int kLooks = 20'000;
-      for (int look = 0; look < kLooks && come.value.load(std::memory_order_relaxed) < threads.count(); ++look) {
+      for (int look = 0; look < kLooks && come.value.load(std::memory_order_relaxed) < threads.count();
+           ++look) {
       }
       closed.value.store(come.value.fetch_or(kClosed, std::memory_order_acq_rel), std::memory_order_release);
     } else {

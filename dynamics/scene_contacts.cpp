@@ -30,15 +30,18 @@ void take_points(const ManifoldQuery& manifolds, std::span<const ObjectPair> pai
 
 // Remembered pairs may keep a gap, with which their boxes no longer meet.
 std::span<const ObjectPair> ContactFinder::find_moved(Scene& scene, MovedQuery& moved,
-                                                      std::span<const ObjectPair> near,
+                                                      std::span<const ObjectPair> meeting,
                                                       const Keeping& keeping) {
-  pairs_.clear(), kept_.clear();
-  std::ranges::set_union(near, keeping.remembered, std::back_inserter(pairs_));
+  pairs_.clear(), kept_.clear(), asked_.clear();
+  const std::span<const ObjectPair> others = keeping.near ? std::span<const ObjectPair>() : meeting;
+  std::ranges::set_union(others, keeping.remembered, std::back_inserter(pairs_));
   require(moved.find(scene, pairs_, {.tolerance = keeping.tolerance}), scene);
   for (std::size_t i = 0; i < pairs_.size(); ++i) {
     if (moved.kept_rows()[i] != kNoIndex) kept_.push_back(pairs_[i]);
   }
-  return moved.rows();
+  if (!keeping.near) return moved.rows();
+  std::ranges::set_union(moved.rows(), *keeping.near, std::back_inserter(asked_));
+  return asked_;
 }
 
 namespace {
@@ -60,8 +63,9 @@ class SceneContacts : public ContactFinder {
     filter_.motion = motion_.data();
     require(scene_.place(bodies, filter_), scene_);
     report_.times.update = stopwatch.lap();
-    require(scene_.find_pairs(), scene_);
-    const std::span<const ObjectPair> asked = find_moved(scene_, moved_, scene_.pairs(), keeping);
+    if (!keeping.near) require(scene_.find_pairs(), scene_);
+    const std::span<const ObjectPair> asked =
+        find_moved(scene_, moved_, keeping.near ? std::span<const ObjectPair>() : scene_.pairs(), keeping);
     report_.times.broad_phase = stopwatch.lap();
     require(contacts_.find(scene_, asked, {}), scene_);
     report_.times.traversal = stopwatch.lap();

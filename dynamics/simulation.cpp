@@ -59,15 +59,17 @@ void Simulation::find_pulls() {
 void Simulation::find_contacts(StepRecord& record) {
   const std::vector<std::uint8_t> idle = this->idle();
   const BodiesAhead ahead = {acting_, states_, idle, options_.dt, pulls_, options_.solver.slop};
-  std::vector<ObjectPair> remembered = cache_.pairs();
+  const std::vector<ObjectPair> touching = cache_.pairs();
+  Keeping keeping = {touching, options_.solver.slop};
   Stopwatch stopwatch;
+  std::vector<ObjectPair> remembered;
   if (parts_.ahead) {
-    const std::vector<ObjectPair> touching = std::move(remembered);
-    remembered.clear();
-    std::ranges::set_union(touching, parts_.ahead->find_near(ahead), std::back_inserter(remembered));
+    parts_.ahead->find_near(ahead);
+    std::ranges::set_union(keeping.remembered, parts_.ahead->slow(), std::back_inserter(remembered));
+    keeping.remembered = remembered, keeping.near = parts_.ahead->fast();
   }
   const double near_seconds = stopwatch.lap();
-  found_ = parts_.contacts->find(poses(), idle, {remembered, options_.solver.slop});
+  found_ = parts_.contacts->find(poses(), idle, keeping);
   take(record, parts_.contacts->report());
   stopwatch.lap();
   if (parts_.ahead) parts_.ahead->add_to(found_, parts_.contacts->kept(), ahead);
@@ -88,9 +90,8 @@ void Simulation::solve(StepRecord& record) {
   std::vector<ContactImpulse> impulses(contacts.size());
   if (options_.solver.warm_start) impulses = cache_.impulses();
   const std::vector<BodyState> before = parts_.continuous ? states_ : std::vector<BodyState>();
-  parts_.solver->step(
-      {acting_, contacts, islands_, options_.dt, pulls_, step_, cache_.is_cold(), threads_},
-      states_, impulses);
+  parts_.solver->step({acting_, contacts, islands_, options_.dt, pulls_, step_, cache_.is_cold(), threads_},
+                      states_, impulses);
   if (parts_.continuous) parts_.continuous->limit(acting_, before, states_, options_.solver.slop);
   cache_.remember(impulses);
   touches_.update(contacts, impulses, idle());
@@ -133,7 +134,8 @@ void Simulation::take_measures(StepRecord& record) const {
     const BodyState& state = states_[i];
     const double speed = norm(state.velocity);
     record.kinetic_energy += kinetic_energy(bodies_[i], state);
-    record.potential_energy -= bodies_[i].gravity_scale * bodies_[i].mass * dot(options_.gravity, state.position);
+    record.potential_energy -=
+        bodies_[i].gravity_scale * bodies_[i].mass * dot(options_.gravity, state.position);
     record.linear_momentum += bodies_[i].mass * state.velocity;
     record.angular_momentum += angular_momentum(bodies_[i], state);
     record.speed_max = std::max(record.speed_max, speed);

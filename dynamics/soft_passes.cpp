@@ -30,11 +30,13 @@ struct OneLane {
   friend OneLane square_root(OneLane a) { return {std::sqrt(a.v)}; }
   friend OneLane select(OneTruth mask, OneLane a, OneLane b) { return mask.is_true ? a : b; }
   friend OneLane larger(OneLane a, OneLane b) { return select(less(a, b), b, a); }
-  friend Vector3Of<OneLane> gathered(const float* const* rows, OneLane) {
-    return {{rows[0][0]}, {rows[0][1]}, {rows[0][2]}};
+  friend MotionOf<OneLane> gather(const SoftMotion* of, const std::uint32_t* body, OneLane) {
+    const auto& [c, s] = of[*body];
+    return {{{c[0]}, {c[1]}, {c[2]}}, {{s[0]}, {s[1]}, {s[2]}}};
   }
-  friend void scatter(const Vector3Of<OneLane>& p, float* const* rows) {
-    rows[0][0] = p.x.v, rows[0][1] = p.y.v, rows[0][2] = p.z.v;
+  friend void scatter(const MotionOf<OneLane>& from, SoftMotion* of, const std::uint32_t* body) {
+    const auto& [c, s] = from;
+    of[*body] = {{c.x.v, c.y.v, c.z.v, 0}, {s.x.v, s.y.v, s.z.v, 0}};
   }
 };
 

@@ -9,8 +9,8 @@
 #define TANDEM_INLINE inline
 #endif
 
-// The passes of a soft step by L: OneLane of soft_passes.cpp, or Lanes of a kind. As lanes.h, this is included by
-// files that are compiled for different machines: all of it has internal linkage.
+// The passes of a soft step by L: OneLane of soft_passes.cpp, or Lanes of a kind. As lanes.h, this is
+// included by files that are compiled for different machines: all of it has internal linkage.
 namespace tandem::dynamics {
 namespace {
 
@@ -68,72 +68,101 @@ TANDEM_INLINE Vector3Of<L> taken(const SoftNumber (&from)[3], int lane) {
   return {taken<L>(from[0], lane), taken<L>(from[1], lane), taken<L>(from[2], lane)};
 }
 
-// gathered(): the first three numbers of a row of each lane. scatter() writes them back.
+/// How the body of each lane moves.
+template <typename L>
+struct MotionOf {
+  Vector3Of<L> centre, spin;
+};
+
+// gather() reads the motions of bodies, and scatter() writes them back.
 #ifdef TANDEM_HAVE_LANES
-TANDEM_INLINE Vector3Of<Lanes4> gathered(const float* const* rows, Lanes4) {
-  Lanes4 four[4] = {load(rows[0]), load(rows[1]), load(rows[2]), load(rows[3])};
-  transpose(four);
-  return {four[0], four[1], four[2]};
-}
-TANDEM_INLINE void scatter(const Vector3Of<Lanes4>& p, float* const* rows) {
-  Lanes4 four[4] = {p.x, p.y, p.z, Lanes4{}};
-  transpose(four);
-  for (int i = 0; i < 4; ++i) std::memcpy(rows[i], &four[i].v, sizeof four[i].v);
+TANDEM_INLINE Vector3Of<Lanes4> columns(const Lanes4& a, const Lanes4& b, const Lanes4& c, const Lanes4& d) {
+  Lanes4 rows[4] = {a, b, c, d};
+  transpose(rows);
+  return {rows[0], rows[1], rows[2]};
 }
 
-TANDEM_INLINE Lanes<8> joined(const Lanes<4>& low, const Lanes<4>& high) {
-  return {__builtin_shufflevector(low.v, high.v, 0, 1, 2, 3, 4, 5, 6, 7)};
+TANDEM_INLINE MotionOf<Lanes4> gather(const SoftMotion* of, const std::uint32_t* body, Lanes4) {
+  const SoftMotion &a = of[body[0]], &b = of[body[1]], &c = of[body[2]], &d = of[body[3]];
+  return {columns(load(a.centre), load(b.centre), load(c.centre), load(d.centre)),
+          columns(load(a.spin), load(b.spin), load(c.spin), load(d.spin))};
 }
+TANDEM_INLINE void scatter(const MotionOf<Lanes4>& from, SoftMotion* of, const std::uint32_t* body) {
+  Lanes4 centres[4] = {from.centre.x, from.centre.y, from.centre.z, Lanes4{}};
+  Lanes4 spins[4] = {from.spin.x, from.spin.y, from.spin.z, Lanes4{}};
+  transpose(centres), transpose(spins);
+  for (int i = 0; i < 4; ++i) {
+    std::memcpy(of[body[i]].centre, &centres[i].v, sizeof centres[i].v);
+    std::memcpy(of[body[i]].spin, &spins[i].v, sizeof spins[i].v);
+  }
+}
+
+// Of four motions the x, y, z of centres in the low half, and of spins in the high one.
+TANDEM_INLINE void transpose_halves(Lanes<8> (&rows)[4]) {
+  const auto low01 = __builtin_shufflevector(rows[0].v, rows[1].v, 0, 8, 1, 9, 4, 12, 5, 13);
+  const auto high01 = __builtin_shufflevector(rows[0].v, rows[1].v, 2, 10, 3, 11, 6, 14, 7, 15);
+  const auto low23 = __builtin_shufflevector(rows[2].v, rows[3].v, 0, 8, 1, 9, 4, 12, 5, 13);
+  const auto high23 = __builtin_shufflevector(rows[2].v, rows[3].v, 2, 10, 3, 11, 6, 14, 7, 15);
+  rows[0].v = __builtin_shufflevector(low01, low23, 0, 1, 8, 9, 4, 5, 12, 13);
+  rows[1].v = __builtin_shufflevector(low01, low23, 2, 3, 10, 11, 6, 7, 14, 15);
+  rows[2].v = __builtin_shufflevector(high01, high23, 0, 1, 8, 9, 4, 5, 12, 13);
+  rows[3].v = __builtin_shufflevector(high01, high23, 2, 3, 10, 11, 6, 7, 14, 15);
+}
+TANDEM_INLINE Lanes<8> low_halves(const Lanes<8>& a, const Lanes<8>& b) {
+  return {__builtin_shufflevector(a.v, b.v, 0, 1, 2, 3, 8, 9, 10, 11)};
+}
+TANDEM_INLINE Lanes<8> high_halves(const Lanes<8>& a, const Lanes<8>& b) {
+  return {__builtin_shufflevector(a.v, b.v, 4, 5, 6, 7, 12, 13, 14, 15)};
+}
+
+TANDEM_INLINE MotionOf<Lanes<8>> gather(const SoftMotion* of, const std::uint32_t* body, Lanes<8>) {
+  Lanes<8> rows[2][4];
+  for (int i = 0; i < 8; ++i) std::memcpy(&rows[i / 4][i % 4].v, &of[body[i]], sizeof(SoftMotion));
+  transpose_halves(rows[0]), transpose_halves(rows[1]);
+  const auto &p = rows[0], &q = rows[1];
+  return {{low_halves(p[0], q[0]), low_halves(p[1], q[1]), low_halves(p[2], q[2])},
+          {high_halves(p[0], q[0]), high_halves(p[1], q[1]), high_halves(p[2], q[2])}};
+}
+TANDEM_INLINE void scatter(const MotionOf<Lanes<8>>& from, SoftMotion* of, const std::uint32_t* body) {
+  const auto &p = from.centre, &q = from.spin;
+  Lanes<8> rows[2][4] = {{low_halves(p.x, q.x), low_halves(p.y, q.y), low_halves(p.z, q.z), {}},
+                         {high_halves(p.x, q.x), high_halves(p.y, q.y), high_halves(p.z, q.z), {}}};
+  transpose_halves(rows[0]), transpose_halves(rows[1]);
+  for (int i = 0; i < 8; ++i) std::memcpy(&of[body[i]], &rows[i / 4][i % 4].v, sizeof(SoftMotion));
+}
+
 TANDEM_INLINE Lanes<16> joined(const Lanes<8>& low, const Lanes<8>& high) {
   return {__builtin_shufflevector(low.v, high.v, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15)};
 }
-TANDEM_INLINE Lanes<4> low_half(const Lanes<8>& x) {
-  return {__builtin_shufflevector(x.v, x.v, 0, 1, 2, 3)};
-}
-TANDEM_INLINE Lanes<4> high_half(const Lanes<8>& x) {
-  return {__builtin_shufflevector(x.v, x.v, 4, 5, 6, 7)};
-}
-TANDEM_INLINE Lanes<8> low_half(const Lanes<16>& x) {
-  return {__builtin_shufflevector(x.v, x.v, 0, 1, 2, 3, 4, 5, 6, 7)};
-}
-TANDEM_INLINE Lanes<8> high_half(const Lanes<16>& x) {
-  return {__builtin_shufflevector(x.v, x.v, 8, 9, 10, 11, 12, 13, 14, 15)};
-}
-
-template <int kCount>
-TANDEM_INLINE Vector3Of<Lanes<kCount>> gathered(const float* const* rows, Lanes<kCount>) {
-  const auto low = gathered(rows, Lanes<kCount / 2>{}),
-             high = gathered(rows + kCount / 2, Lanes<kCount / 2>{});
+TANDEM_INLINE Vector3Of<Lanes<16>> joined(const Vector3Of<Lanes<8>>& low, const Vector3Of<Lanes<8>>& high) {
   return {joined(low.x, high.x), joined(low.y, high.y), joined(low.z, high.z)};
 }
-template <int kCount>
-TANDEM_INLINE void scatter(const Vector3Of<Lanes<kCount>>& p, float* const* rows) {
-  using Half = Vector3Of<Lanes<kCount / 2>>;
-  scatter(Half{low_half(p.x), low_half(p.y), low_half(p.z)}, rows);
-  scatter(Half{high_half(p.x), high_half(p.y), high_half(p.z)}, rows + kCount / 2);
+template <int kFirst>
+TANDEM_INLINE Lanes<8> half_of(const Lanes<16>& x) {
+  return {__builtin_shufflevector(x.v, x.v, kFirst, kFirst + 1, kFirst + 2, kFirst + 3, kFirst + 4,
+                                  kFirst + 5, kFirst + 6, kFirst + 7)};
+}
+template <int kFirst>
+TANDEM_INLINE Vector3Of<Lanes<8>> half_of(const Vector3Of<Lanes<16>>& p) {
+  return {half_of<kFirst>(p.x), half_of<kFirst>(p.y), half_of<kFirst>(p.z)};
+}
+
+TANDEM_INLINE MotionOf<Lanes<16>> gather(const SoftMotion* of, const std::uint32_t* body, Lanes<16>) {
+  const auto low = gather(of, body, Lanes<8>{}), high = gather(of, body + 8, Lanes<8>{});
+  return {joined(low.centre, high.centre), joined(low.spin, high.spin)};
+}
+TANDEM_INLINE void scatter(const MotionOf<Lanes<16>>& from, SoftMotion* of, const std::uint32_t* body) {
+  scatter(MotionOf<Lanes<8>>{half_of<0>(from.centre), half_of<0>(from.spin)}, of, body);
+  scatter(MotionOf<Lanes<8>>{half_of<8>(from.centre), half_of<8>(from.spin)}, of, body + 8);
 }
 #endif
-
-template <typename L>
-TANDEM_INLINE Vector3Of<L> gathered(const SoftMotion* of, const std::uint32_t* bodies, float (SoftMotion::*what)[4]) {
-  const float* places[L::kLanes];
-  for (int i = 0; i < L::kLanes; ++i) places[i] = of[bodies[i]].*what;
-  return gathered(places, L{});
-}
-
-template <typename L>
-TANDEM_INLINE void scatter(const Vector3Of<L>& p, SoftMotion* of, const std::uint32_t* bodies,
-                           float (SoftMotion::*what)[4]) {
-  float* places[L::kLanes];
-  for (int i = 0; i < L::kLanes; ++i) places[i] = of[bodies[i]].*what;
-  scatter(p, places);
-}
 
 // The bodies of as many pairs as there are lanes, from `lane` on.
 template <typename L>
 class PairVisit {
  public:
-  TANDEM_INLINE PairVisit(const SoftRows& rows, std::uint32_t group, int lane) : PairVisit(rows, rows.pairs[group], rows.turnings[group], lane) {}
+  TANDEM_INLINE PairVisit(const SoftRows& rows, std::uint32_t group, int lane)
+      : PairVisit(rows, rows.pairs[group], rows.turnings[group], lane) {}
 
  private:
   TANDEM_INLINE PairVisit(const SoftRows& rows, SoftPairs& pairs, SoftTurning& turning, int lane)
@@ -141,20 +170,15 @@ class PairVisit {
         pairs_(pairs),
         turning_(turning),
         lane_(lane),
-        velocity_a_(gathered<L>(rows.velocities, pairs.body_a + lane, &SoftMotion::centre)),
-        velocity_b_(gathered<L>(rows.velocities, pairs.body_b + lane, &SoftMotion::centre)),
-        spin_a_(gathered<L>(rows.velocities, pairs.body_a + lane, &SoftMotion::spin)),
-        spin_b_(gathered<L>(rows.velocities, pairs.body_b + lane, &SoftMotion::spin)),
+        a_(gather(rows.velocities, pairs.body_a + lane, L{})),
+        b_(gather(rows.velocities, pairs.body_b + lane, L{})),
         inverse_mass_a_(taken<L>(pairs.inverse_mass_a, lane)),
         inverse_mass_b_(taken<L>(pairs.inverse_mass_b, lane)) {}
 
-
  public:
   TANDEM_INLINE void write() const {
-    scatter(velocity_a_, rows_.velocities, pairs_.body_a + lane_, &SoftMotion::centre);
-    scatter(velocity_b_, rows_.velocities, pairs_.body_b + lane_, &SoftMotion::centre);
-    scatter(spin_a_, rows_.velocities, pairs_.body_a + lane_, &SoftMotion::spin);
-    scatter(spin_b_, rows_.velocities, pairs_.body_b + lane_, &SoftMotion::spin);
+    scatter(a_, rows_.velocities, pairs_.body_a + lane_);
+    scatter(b_, rows_.velocities, pairs_.body_b + lane_);
   }
 
   TANDEM_INLINE void start() {
@@ -184,15 +208,12 @@ class PairVisit {
 
   // Condition: rows.moved is that of this time.
   TANDEM_INLINE void follow(float time) {
-    const auto moved = gathered<L>(rows_.moved, pairs_.body_b + lane_, &SoftMotion::centre) -
-                       gathered<L>(rows_.moved, pairs_.body_a + lane_, &SoftMotion::centre);
-    const auto turned_a = gathered<L>(rows_.moved, pairs_.body_a + lane_, &SoftMotion::spin),
-               turned_b = gathered<L>(rows_.moved, pairs_.body_b + lane_, &SoftMotion::spin);
+    const auto a = gather(rows_.moved, pairs_.body_a + lane_, L{}),
+               b = gather(rows_.moved, pairs_.body_b + lane_, L{});
     for (std::uint32_t i = 0; i < pairs_.contacts; ++i) {
       SoftNormal& row = normal(i);
       const Direction along = direction(row.direction);
-      const L change = dot(along.along, moved) + dot(along.turn_a, turned_a) + dot(along.turn_b, turned_b);
-      put(take(gap(i).separation) + change + time * take(row.drive), row.followed, lane_);
+      put(take(gap(i).separation) + speed(along, a, b) + time * take(row.drive), row.followed, lane_);
     }
   }
 
@@ -225,7 +246,8 @@ class PairVisit {
       const L old = take(row.impulse);
       const Direction along = direction(row.direction);
       const L next = next_impulse(row, along, old, -wanted, one, none);
-      const L change = select(less(none, wanted), select(less(none, take(gap(i).strongest)), next - old, none), none);
+      const L change =
+          select(less(none, wanted), select(less(none, take(gap(i).strongest)), next - old, none), none);
       push(along, change);
       put(old + change, row.impulse, lane_);
     }
@@ -236,7 +258,8 @@ class PairVisit {
     const L none{}, inverse_h = all_of<L>(rows_.inverse_h);
     L largest{}, squares{};
     const auto add = [&](const L& change, const L& mass) {
-      const L size = select(less(none, mass), magnitude(change) / select(less(none, mass), mass, all_of<L>(1)), none);
+      const L size =
+          select(less(none, mass), magnitude(change) / select(less(none, mass), mass, all_of<L>(1)), none);
       largest = larger(largest, size);
       squares = squares + size * size;
     };
@@ -277,14 +300,15 @@ class PairVisit {
     return rows_.frictions[pairs_.first + contact];
   }
 
-  TANDEM_INLINE L speed(const Direction& d) const {
-    return dot(d.along, velocity_b_ - velocity_a_) + dot(d.turn_a, spin_a_) + dot(d.turn_b, spin_b_);
+  TANDEM_INLINE static L speed(const Direction& d, const MotionOf<L>& a, const MotionOf<L>& b) {
+    return dot(d.along, b.centre - a.centre) + dot(d.turn_a, a.spin) + dot(d.turn_b, b.spin);
   }
+  TANDEM_INLINE L speed(const Direction& d) const { return speed(d, a_, b_); }
   TANDEM_INLINE void push(const Direction& d, const L& impulse) {
-    velocity_a_ = velocity_a_ - (impulse * inverse_mass_a_) * d.along;
-    velocity_b_ = velocity_b_ + (impulse * inverse_mass_b_) * d.along;
-    spin_a_ = spin_a_ + impulse * d.turn_a;
-    spin_b_ = spin_b_ + impulse * d.turn_b;
+    a_.centre = a_.centre - (impulse * inverse_mass_a_) * d.along;
+    b_.centre = b_.centre + (impulse * inverse_mass_b_) * d.along;
+    a_.spin = a_.spin + impulse * d.turn_a;
+    b_.spin = b_.spin + impulse * d.turn_b;
   }
 
   TANDEM_INLINE L next_impulse(const SoftNormal& row, const Direction& along, const L& impulse, const L& bias,
@@ -293,7 +317,8 @@ class PairVisit {
     const L wanted = impulse - take(row.mass) * mass_scale * (w + bias) - impulse_scale * impulse;
     return larger(L{}, wanted);
   }
-  TANDEM_INLINE void visit(std::uint32_t contact, const L& bias, const L& mass_scale, const L& impulse_scale) {
+  TANDEM_INLINE void visit(std::uint32_t contact, const L& bias, const L& mass_scale,
+                           const L& impulse_scale) {
     SoftNormal& row = normal(contact);
     const L impulse = take(row.impulse);
     const Direction along = direction(row.direction);
@@ -331,8 +356,8 @@ class PairVisit {
   TANDEM_INLINE static L within(const L& x, const L& bound) { return larger(-bound, smaller(x, bound)); }
 
   TANDEM_INLINE void turn(const Vector3Of<L>& impulse) {
-    spin_a_ = spin_a_ - across(turning_.spread_a, impulse);
-    spin_b_ = spin_b_ + across(turning_.spread_b, impulse);
+    a_.spin = a_.spin - across(turning_.spread_a, impulse);
+    b_.spin = b_.spin + across(turning_.spread_b, impulse);
   }
   TANDEM_INLINE Vector3Of<L> row(const SoftNumber* matrix, int i) const {
     return {take(matrix[3 * i]), take(matrix[3 * i + 1]), take(matrix[3 * i + 2])};
@@ -346,7 +371,7 @@ class PairVisit {
 
   TANDEM_INLINE void resist_turning(const L& push_of_normals) {
     const L bound = take(turning_.lever) * push_of_normals, mass = take(turning_.mass);
-    const Vector3Of<L> turning = applied(turning_.spread_b, spin_b_) - applied(turning_.spread_a, spin_a_) +
+    const Vector3Of<L> turning = applied(turning_.spread_b, b_.spin) - applied(turning_.spread_a, a_.spin) +
                                  taken<L>(turning_.drive, lane_);
     const Vector3Of<L> old = taken<L>(turning_.impulse, lane_);
     Vector3Of<L> next = old - mass * turning;
@@ -361,7 +386,7 @@ class PairVisit {
   SoftPairs& pairs_;
   SoftTurning& turning_;
   int lane_;
-  Vector3Of<L> velocity_a_, velocity_b_, spin_a_, spin_b_;
+  MotionOf<L> a_, b_;
   L inverse_mass_a_, inverse_mass_b_;
 };
 
@@ -396,8 +421,7 @@ constexpr SoftPasses kSoftPassesOf = {
     },
     [](const SoftRows& rows, std::uint32_t begin, std::uint32_t end, float) {
       for (std::uint32_t i = begin; i < end; ++i) {
-        if (rows.pairs[i].bounces)
-          visit_all<L>(rows, i, i + 1, [](PairVisit<L>& visit) { visit.rebound(); });
+        if (rows.pairs[i].bounces) visit_all<L>(rows, i, i + 1, [](PairVisit<L>& visit) { visit.rebound(); });
       }
     },
     [](const SoftRows& rows, std::uint32_t begin, std::uint32_t end, float) {

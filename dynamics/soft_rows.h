@@ -5,8 +5,8 @@
 
 namespace tandem::dynamics {
 
-/// Pairs of bodies that a soft step solves side by side: no two of them move the same body, so that the result
-/// does not depend on how many a machine takes at once.
+/// Pairs of bodies that a soft step solves side by side: no two of them move the same body, so that the
+/// result does not depend on how many a machine takes at once.
 inline constexpr int kSoftWidth = 16;
 
 /// A number of each pair.
@@ -20,7 +20,8 @@ struct alignas(32) SoftMotion {
   float centre[4], spin[4];
 };
 
-/// A direction of a contact: its velocity is along . (centre_b - centre_a) + turn_a . spin_a + turn_b . spin_b.
+/// A direction of a contact: its velocity is along . (centre_b - centre_a) + turn_a . spin_a + turn_b .
+/// spin_b.
 struct SoftDirection {
   SoftNumber along[3], turn_a[3], turn_b[3];
 };
@@ -71,8 +72,8 @@ struct SoftPairs {
 
 /// All that the passes of a soft step read and write.
 struct SoftRows {
-  SoftMotion* velocities;    ///< of each body
-  const SoftMotion* moved;   ///< how far each has
+  SoftMotion* velocities;   ///< of each body
+  const SoftMotion* moved;  ///< how far each has
   SoftPairs* pairs;
   SoftTurning* turnings;
   SoftNormal* normals;

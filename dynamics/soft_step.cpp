@@ -22,7 +22,8 @@ std::uint32_t shuffled(std::uint32_t a, std::uint32_t b) {
 }
 
 void put(const Vector3& x, float (&to)[4]) {
-  to[0] = static_cast<float>(x.x), to[1] = static_cast<float>(x.y), to[2] = static_cast<float>(x.z), to[3] = 0;
+  to[0] = static_cast<float>(x.x), to[1] = static_cast<float>(x.y), to[2] = static_cast<float>(x.z),
+  to[3] = 0;
 }
 void put(double x, SoftNumber& to, int lane) {
   to.of[lane] = static_cast<float>(x);
@@ -53,14 +54,15 @@ double inverse_mass(const SteppedBody& body) {
 // other deeper, the pushes are hundreds of times their weight, and whichever point is found next throws
 // them about. So a deep contact pushes for what it is deeper than the same pair's contacts that push
 // against it. Result: by how much.
-double opposed(std::span<const ContactPoint> all, std::span<const std::uint32_t> of_pair, const Vector3& normal,
-               double separation, double slop) {
+double opposed(std::span<const ContactPoint> all, std::span<const std::uint32_t> of_pair,
+               const Vector3& normal, double separation, double slop) {
   constexpr double kDeep = 4;  // slops
   const double deep = kDeep * slop;
   if (separation > -deep) return 0;
   double opposed = 0;
   for (const std::uint32_t other : of_pair)
-    opposed = std::max(opposed, -std::min(dot(normal, all[other].normal), 0.0) * std::max(all[other].depth - slop, 0.0));
+    opposed = std::max(
+        opposed, -std::min(dot(normal, all[other].normal), 0.0) * std::max(all[other].depth - slop, 0.0));
   return std::min(opposed, -deep - separation);
 }
 
@@ -112,7 +114,8 @@ void SoftSolver::gather(const Step& step, std::span<const std::uint32_t> islands
       const ObjectPair pair = {contact.body_a, contact.body_b};
       if (pair != last) {
         last = pair;
-        pairs_.push_back({static_cast<std::uint32_t>(contacts_.size()), 0, place(pair.a), place(pair.b), 0, 0});
+        pairs_.push_back(
+            {static_cast<std::uint32_t>(contacts_.size()), 0, place(pair.a), place(pair.b), 0, 0});
       }
       contacts_.push_back(i);
       ++pairs_.back().contacts;
@@ -127,8 +130,8 @@ std::vector<std::uint32_t> SoftSolver::find_colours() {
   return dynamics::find_colours(coloured_, body_.size());
 }
 
-// Bodies of a region are near each other, and a thread that visits its pairs has them at hand. Result: of each
-// body.
+// Bodies of a region are near each other, and a thread that visits its pairs has them at hand. Result: of
+// each body.
 std::vector<std::uint32_t> SoftSolver::find_regions(const Step& step, std::uint32_t regions) const {
   std::vector<std::uint32_t> out(body_.size());
   if (regions == 1) return out;
@@ -138,7 +141,8 @@ std::vector<std::uint32_t> SoftSolver::find_regions(const Step& step, std::uint3
   int longest = 0;
   double length = -1;
   for (int axis = 0; axis < 3; ++axis) {
-    const auto [low, high] = std::ranges::minmax(order, {}, [&](std::uint32_t i) { return position(i, axis); });
+    const auto [low, high] =
+        std::ranges::minmax(order, {}, [&](std::uint32_t i) { return position(i, axis); });
     const double of_axis = position(high, axis) - position(low, axis);
     if (of_axis > length) length = of_axis, longest = axis;
   }
@@ -150,8 +154,8 @@ std::vector<std::uint32_t> SoftSolver::find_regions(const Step& step, std::uint3
   return out;
 }
 
-// Gives each pair a place in a group of its colour and region, those with many contacts first, so that few places
-// of a group are empty.
+// Gives each pair a place in a group of its colour and region, those with many contacts first, so that few
+// places of a group are empty.
 void SoftSolver::make_groups(const Step& step) {
   constexpr std::uint32_t kMany = 63;
   const std::uint32_t regions = step.input.threads.count();
@@ -168,7 +172,8 @@ void SoftSolver::make_groups(const Step& step) {
   for (std::uint32_t k = 0; k < order_.size(); ++k) {
     Pair& pair = pairs_[order_[k]];
     const bool begins = k == 0 || key(order_[k]) != key(order_[k - 1]);
-    while (region_begin_.size() <= key(order_[k])) region_begin_.push_back(static_cast<std::uint32_t>(groups_.size()));
+    while (region_begin_.size() <= key(order_[k]))
+      region_begin_.push_back(static_cast<std::uint32_t>(groups_.size()));
     if (begins || groups_.back().pairs == kSoftWidth) {
       group_begin_.push_back(k);
       groups_.emplace_back().first = contacts;
@@ -186,7 +191,8 @@ void SoftSolver::make_groups(const Step& step) {
   find_parts(regions);
 }
 
-// A colour of many groups is a part, whose regions threads share. Others are one part, that one thread visits.
+// A colour of many groups is a part, whose regions threads share. Others are one part, that one thread
+// visits.
 void SoftSolver::find_parts(std::uint32_t regions) {
   parts_.clear();
   for (std::size_t c = 0; c + 1 < region_begin_.size(); c += regions) {
@@ -201,7 +207,8 @@ void SoftSolver::find_parts(std::uint32_t regions) {
 }
 
 void SoftSolver::fill(const Step& step) {
-  // Each group has a body of its own for what contacts do not move, so that no two threads write the same one.
+  // Each group has a body of its own for what contacts do not move, so that no two threads write the same
+  // one.
   auto places = static_cast<std::uint32_t>(body_.size());
   for (SoftPairs& group : groups_) {
     std::ranges::fill(group.body_a, places), std::ranges::fill(group.body_b, places);
@@ -219,7 +226,8 @@ void SoftSolver::fill(const Step& step) {
   });
   threads.for_parts(groups_.size(), kGroupsAtOnce, [&](std::size_t group) {
     const auto clear = [&](auto& rows) {
-      std::fill_n(rows.begin() + groups_[group].first, groups_[group].contacts, typename std::decay_t<decltype(rows)>::value_type{});
+      std::fill_n(rows.begin() + groups_[group].first, groups_[group].contacts,
+                  typename std::decay_t<decltype(rows)>::value_type{});
     };
     clear(normals_), clear(gaps_), clear(frictions_);
     turnings_[group] = {};
@@ -232,7 +240,8 @@ void SoftSolver::fill_pair(const Step& step, const Pair& pair) {
   SoftPairs& group = groups_[pair.group];
   const int lane = pair.lane;
   const SteppedBody &a = bodies_[pair.a], &b = bodies_[pair.b];
-  const std::span<const std::uint32_t> contacts = std::span(contacts_).subspan(pair.first_contact, pair.contacts);
+  const std::span<const std::uint32_t> contacts =
+      std::span(contacts_).subspan(pair.first_contact, pair.contacts);
   const double substeps = step.options.substeps;
   SoftTurning& turns = turnings_[pair.group];
   if (a.moves) group.body_a[lane] = pair.a, put(a.scale, turns.spread_a, lane);
@@ -258,7 +267,8 @@ void SoftSolver::fill_pair(const Step& step, const Pair& pair) {
     put(rows.impulse.x / substeps, normal.impulse, lane);
     SoftGap& gap = gaps_[group.first + i];
     const double less = opposed(step.input.contacts, contacts, along, rows.separation, step.options.slop);
-    put(rows.separation, gap.separation, lane), put(rows.rebound, gap.rebound, lane), put(less, gap.opposed, lane);
+    put(rows.separation, gap.separation, lane), put(rows.rebound, gap.rebound, lane),
+        put(less, gap.opposed, lane);
     group.bounces = group.bounces || rows.rebound > 0;
     group.is_opposed = group.is_opposed || less > 0;
     SoftFriction& friction = frictions_[group.first + i];
@@ -299,8 +309,9 @@ void SoftSolver::run(const Step& step) {
     for (int sweep = 0; sweep < kRestitutionSweeps; ++sweep) add_sweep(passes.rebound);
   }
   add_sweep(passes.judge);
-  const SoftRows rows = {velocities_.data(), moved_.data(), groups_.data(), turnings_.data(), normals_.data(),
-                         gaps_.data(),       frictions_.data(), static_cast<float>(1 / step.h)};
+  const SoftRows rows = {
+      velocities_.data(), moved_.data(), groups_.data(),    turnings_.data(),
+      normals_.data(),    gaps_.data(),  frictions_.data(), static_cast<float>(1 / step.h)};
   run_phases(step.input.threads, phases.size(), [&](std::size_t phase, std::uint32_t i, std::uint32_t n) {
     const auto& [work, part, pass, time] = phases[phase];
     if (work != Work::pass) {
@@ -332,7 +343,8 @@ void SoftSolver::visit_body(std::size_t i, Work work, float h) {
   }
 }
 
-void SoftSolver::write(const Step& step, std::span<BodyState> states, std::span<ContactImpulse> impulses) const {
+void SoftSolver::write(const Step& step, std::span<BodyState> states,
+                       std::span<ContactImpulse> impulses) const {
   step.input.threads.for_parts(body_.size() - 1, kBodiesAtOnce, [&](std::size_t before) {
     const std::size_t i = before + 1;
     const SteppedBody& body = bodies_[i];
@@ -351,10 +363,10 @@ void SoftSolver::write(const Step& step, std::span<BodyState> states, std::span<
     for (std::uint32_t i = 0; i < pair.contacts; ++i) {
       const std::uint32_t contact = contacts_[pair.first_contact + i], row = groups_[pair.group].first + i;
       const auto [first, second] = Tangents(step.input.contacts[contact].normal);
-      impulses[contact] = {
-          substeps * of(normals_[row].impulse),
-          substeps * (of(frictions_[row].first_impulse) * first + of(frictions_[row].second_impulse) * second),
-          substeps / pair.contacts * turning};
+      impulses[contact] = {substeps * of(normals_[row].impulse),
+                           substeps * (of(frictions_[row].first_impulse) * first +
+                                       of(frictions_[row].second_impulse) * second),
+                           substeps / pair.contacts * turning};
     }
   });
 }

@@ -79,7 +79,7 @@ class SoftSolver {
   std::vector<SoftGap> gaps_;
   std::vector<SoftFriction> frictions_;
   std::vector<SoftMotion> velocities_, moved_;  // what the step adds to the motion of its start
-  std::vector<SoftMotion> gains_, start_;       // what a substep adds to each; the velocities without its contacts
+  std::vector<SoftMotion> gains_, start_;  // what a substep adds to each; the velocities without its contacts
 };
 
 }  // namespace tandem::dynamics

@@ -9,6 +9,7 @@
 #include "bvhbench/simulator/run.h"
 #include "command.h"
 #include "common/number_words.h"
+#include "dynamics/scene_contacts.h"
 
 namespace tandem::bench {
 namespace {
@@ -246,10 +247,13 @@ ExitCode run(const char* kind, SimulateArguments arguments, const SetUp& set_up)
   std::unique_ptr<ContinuousMotion> continuous;
   if (arguments.continuous)
     continuous = std::make_unique<ContinuousMotion>(start.shapes(), options.threads, start.filter);
-  Simulator simulator(
-      start.bodies.bodies, start.bodies.states,
-      make_mesh_contact_finder(std::move(engine), start.shapes(), options.threads, arguments.ask_all),
-      options, std::move(continuous), std::move(ahead));
+  // What World does.
+  const bool is_world = arguments.engine == "tandem" && !arguments.fast && !arguments.ask_all;
+  Simulator simulator(start.bodies.bodies, start.bodies.states,
+                      is_world ? make_scene_contacts(start.shapes(), options.threads, start.filter)
+                               : make_mesh_contact_finder(std::move(engine), start.shapes(), options.threads,
+                                                          arguments.ask_all),
+                      options, std::move(continuous), std::move(ahead));
   const RunResults results = run_simulation(simulator, description, start.reentry, arguments.run);
   print(arguments, report_of(kind, arguments, description, results));
   return kDone;

@@ -9,8 +9,10 @@ std::vector<std::uint32_t> find_colours(std::span<const ColouredPair> pairs, std
   std::vector<std::array<std::uint64_t, kWords>> taken(bodies);
   std::vector<std::uint32_t> colours(pairs.size());
   std::uint32_t own = kSharedColours;
+  const auto by_low =
+      sorted_by(all_below(pairs.size()), 256, [&](std::uint32_t i) { return pairs[i].order & 255; });
   for (const std::uint32_t i :
-       sorted_by(all_below(pairs.size()), kColouredOrders, [&](std::uint32_t k) { return pairs[k].order; })) {
+       sorted_by(by_low, kColouredOrders / 256, [&](std::uint32_t k) { return pairs[k].order >> 8; })) {
     const std::uint32_t a = pairs[i].a, b = pairs[i].b;
     std::uint32_t colour = 0;
     while (colour < kSharedColours) {

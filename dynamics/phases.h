@@ -20,10 +20,10 @@ inline PhasePart part_of(std::size_t things, std::uint32_t i, std::uint32_t n) {
 
 /// Calls work(phase, i, n) for each phase below `phases` and i below n, phase after phase: a phase begins
 /// when all calls of the one before have ended, and calls of one phase run side by side. n is how many
-/// threads come at once, and the same in all phases. They must not throw.
+/// threads come at once, at most `workers`, and the same in all phases. They must not throw.
 template <typename Work>
-void run_phases(Threads& threads, std::size_t phases, const Work& work) {
-  if (threads.count() == 1) {
+void run_phases(Threads& threads, std::uint32_t workers, std::size_t phases, const Work& work) {
+  if (workers == 1) {
     for (std::size_t phase = 0; phase < phases; ++phase) work(phase, 0u, 1u);
     return;
   }
@@ -36,7 +36,7 @@ void run_phases(Threads& threads, std::size_t phases, const Work& work) {
       if (look > kLooks) std::this_thread::yield();
     }
   };
-  threads.on_each([&] {
+  threads.on_each(workers, [&] {
     // Whoever comes late goes again: the first closes the door when all are there, or have had time to be.
     constexpr std::uint64_t kClosed = std::uint64_t{1} << 32;
     const std::uint64_t before = come.value.fetch_add(1, std::memory_order_acq_rel);
@@ -44,8 +44,7 @@ void run_phases(Threads& threads, std::size_t phases, const Work& work) {
     const auto i = static_cast<std::uint32_t>(before);
     if (i == 0) {
       constexpr int kLooks = 20'000;
-      for (int look = 0; look < kLooks && come.value.load(std::memory_order_relaxed) < threads.count();
-           ++look) {
+      for (int look = 0; look < kLooks && come.value.load(std::memory_order_relaxed) < workers; ++look) {
       }
       closed.value.store(come.value.fetch_or(kClosed, std::memory_order_acq_rel), std::memory_order_release);
     } else {

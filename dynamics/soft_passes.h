@@ -1,5 +1,4 @@
 #pragma once
-#include <algorithm>
 #include <cstring>
 
 #include "dynamics/soft_rows.h"
@@ -31,13 +30,6 @@ TANDEM_INLINE L taken(const SoftNumber& from, int lane) {
 template <typename L>
 TANDEM_INLINE void put(const L& x, SoftNumber& to, int lane) {
   std::memcpy(to.of + lane, &x.v, sizeof x.v);
-}
-
-template <typename L>
-TANDEM_INLINE float at(const L& x, int lane) {
-  float all[L::kLanes];
-  std::memcpy(all, &x.v, sizeof all);
-  return all[lane];
 }
 
 template <typename L>
@@ -277,10 +269,8 @@ class PairVisit {
       add(within(wanted1, rest_of(bound, old2)) - old1, mass);
       add(within(wanted2, rest_of(bound, old1)) - old2, mass);
     }
-    for (int i = 0; i < L::kLanes; ++i) {
-      pairs_.largest_residual = std::max(pairs_.largest_residual, at(largest, i));
-      pairs_.residual_squares += at(squares, i);
-    }
+    put(largest, pairs_.largest_residual, lane_);
+    put(squares, pairs_.residual_squares, lane_);
   }
 
  private:

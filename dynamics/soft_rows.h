@@ -67,7 +67,7 @@ struct SoftPairs {
   std::uint32_t contacts = 0;                       ///< of the pair that has the most
   bool bounces = false;                             ///< a rebound is more than 0
   bool is_opposed = false;                          ///< an `opposed` is more than 0
-  float largest_residual = 0, residual_squares = 0;  ///< of the rows, a result
+  SoftNumber largest_residual, residual_squares;    ///< of the rows of each pair, a result
 };
 
 /// All that the passes of a soft step read and write.

@@ -158,9 +158,14 @@ std::vector<std::uint32_t> SoftSolver::find_regions(const Step& step, std::uint3
 // places of a group are empty.
 void SoftSolver::make_groups(const Step& step) {
   constexpr std::uint32_t kMany = 63;
-  const std::uint32_t regions = step.input.threads.count();
-  const std::vector<std::uint32_t> colours = find_colours(), region_of = find_regions(step, regions);
+  constexpr std::uint32_t kGroupsOfThread =
+      4;  // of a colour: fewer are not worth that threads wait for others
+  const std::vector<std::uint32_t> colours = find_colours();
   const std::uint32_t colour_count = *std::ranges::max_element(colours) + 1;
+  const auto most =
+      static_cast<std::uint32_t>(pairs_.size() / (std::size_t{colour_count} * kSoftWidth * kGroupsOfThread));
+  const std::uint32_t regions = std::clamp(most, 1u, step.input.threads.count());
+  const std::vector<std::uint32_t> region_of = find_regions(step, regions);
   const auto key = [&](std::uint32_t i) {
     return colours[i] * regions + region_of[pairs_[i].a != 0 ? pairs_[i].a : pairs_[i].b];
   };
@@ -188,15 +193,16 @@ void SoftSolver::make_groups(const Step& step) {
   group_begin_.push_back(static_cast<std::uint32_t>(order_.size()));
   turnings_.resize(groups_.size());
   normals_.resize(contacts), gaps_.resize(contacts), frictions_.resize(contacts);
-  find_parts(regions);
+  regions_ = regions;
+  find_parts();
 }
 
 // A colour of many groups is a part, whose regions threads share. Others are one part, that one thread
 // visits.
-void SoftSolver::find_parts(std::uint32_t regions) {
+void SoftSolver::find_parts() {
   parts_.clear();
-  for (std::size_t c = 0; c + 1 < region_begin_.size(); c += regions) {
-    const std::uint32_t begin = region_begin_[c], end = region_begin_[c + regions];
+  for (std::size_t c = 0; c + 1 < region_begin_.size(); c += regions_) {
+    const std::uint32_t begin = region_begin_[c], end = region_begin_[c + regions_];
     if (end - begin >= kSharedGroups)
       parts_.push_back({begin, end, &region_begin_[c]});
     else if (!parts_.empty() && parts_.back().region_begin == nullptr)
@@ -312,18 +318,19 @@ void SoftSolver::run(const Step& step) {
   const SoftRows rows = {
       velocities_.data(), moved_.data(), groups_.data(),    turnings_.data(),
       normals_.data(),    gaps_.data(),  frictions_.data(), static_cast<float>(1 / step.h)};
-  run_phases(step.input.threads, phases.size(), [&](std::size_t phase, std::uint32_t i, std::uint32_t n) {
-    const auto& [work, part, pass, time] = phases[phase];
-    if (work != Work::pass) {
-      const auto [begin, end] = part_of(body_.size(), i, n);
-      for (std::size_t j = begin; j < end; ++j) visit_body(j, work, static_cast<float>(step.h));
-    } else if (part.region_begin != nullptr) {
-      for (std::uint32_t region = i; region < step.input.threads.count(); region += n)
-        pass(rows, part.region_begin[region], part.region_begin[region + 1], time);
-    } else if (i == 0) {
-      pass(rows, part.begin, part.end, time);
-    }
-  });
+  run_phases(step.input.threads, regions_, phases.size(),
+             [&](std::size_t phase, std::uint32_t i, std::uint32_t n) {
+               const auto& [work, part, pass, time] = phases[phase];
+               if (work != Work::pass) {
+                 const auto [begin, end] = part_of(body_.size(), i, n);
+                 for (std::size_t j = begin; j < end; ++j) visit_body(j, work, static_cast<float>(step.h));
+               } else if (part.region_begin != nullptr) {
+                 for (std::uint32_t region = i; region < regions_; region += n)
+                   pass(rows, part.region_begin[region], part.region_begin[region + 1], time);
+               } else if (i == 0) {
+                 pass(rows, part.begin, part.end, time);
+               }
+             });
 }
 
 // The contacts of a substep begin with what they added to the velocities in the one before.
@@ -373,7 +380,10 @@ void SoftSolver::write(const Step& step, std::span<BodyState> states,
 
 Residual SoftSolver::residual() const {
   Residual out;
-  for (const SoftPairs& group : groups_) out.add(Residual{group.largest_residual, group.residual_squares});
+  for (const Pair& pair : pairs_) {
+    const SoftPairs& group = groups_[pair.group];
+    out.add(Residual{group.largest_residual.of[pair.lane], group.residual_squares.of[pair.lane]});
+  }
   return out;
 }
 

@@ -54,7 +54,7 @@ class SoftSolver {
   std::vector<std::uint32_t> find_colours();
   std::vector<std::uint32_t> find_regions(const Step& step, std::uint32_t regions) const;
   void make_groups(const Step& step);
-  void find_parts(std::uint32_t regions);
+  void find_parts();
   void fill(const Step& step);
   void fill_pair(const Step& step, const Pair& pair);
   void run(const Step& step);
@@ -72,6 +72,7 @@ class SoftSolver {
   std::vector<std::uint32_t> order_;         // of pairs, group by group
   std::vector<std::uint32_t> group_begin_;   // in order_
   std::vector<std::uint32_t> region_begin_;  // of its groups, for each colour
+  std::uint32_t regions_ = 1;                // as many as threads
   std::vector<SweepPart> parts_;
   std::vector<SoftPairs> groups_;
   std::vector<SoftTurning> turnings_;

@@ -39,12 +39,13 @@ class Threads {
     if (thrown) std::rethrow_exception(thrown);
   }
 
-  /// Calls work() on this thread, and on others that come before it has returned there. It must return only
-  /// when nothing is left to begin, and not throw.
+  /// Calls work() on this thread and on others that come before it has returned there, together at most
+  /// `workers`, which is not more than count(). It must return only when nothing is left to begin, and not
+  /// throw.
   template <typename Work>
-  void on_each(const Work& work) {
+  void on_each(std::uint32_t workers, const Work& work) {
     workers_.run(
-        count_, [](void* context, std::uint32_t) { (*static_cast<const Work*>(context))(); },
+        workers, [](void* context, std::uint32_t) { (*static_cast<const Work*>(context))(); },
         const_cast<Work*>(&work));
   }
 

@@ -328,7 +328,7 @@ void add_run_options(Command command, SimulateArguments& arguments) {
        {"--density", arguments.density, "D [1000]", "of the bodies, in kg/m^3", between(1e-12, 1e12)},
        threads_option(arguments, "the results do"),
        {"--trajectory", run.trajectory_every, "K [0]", "keep the state after every K-th step; 0: none"},
-       {"--checkpoint", run.checkpoint_seconds, "S [60]", "seconds between two writings of OUTPUT.part",
+       {"--checkpoint", run.checkpoint_seconds, "S [10]", "seconds between two writings of OUTPUT.part",
         between(0, 1e9)},
        {"--resume", run.resume, "go on from OUTPUT.part; nothing to do where OUTPUT is done"},
        json_option(arguments),

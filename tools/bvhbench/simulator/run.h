@@ -39,7 +39,7 @@ struct RunOptions {
   std::uint32_t steps = 1;             ///< to have made in the end
   std::uint32_t trajectory_every = 0;  ///< 0: no trajectory
   bool resume = false;                 ///< go on from the part file, if there is one
-  double checkpoint_seconds = 60;      ///< between two writings of the part file
+  double checkpoint_seconds = 10;      ///< between two writings of the part file
 };
 
 /// Makes the steps and writes the file. SIGINT, SIGTERM and SIGHUP end the process once the step under way is

@@ -50,6 +50,14 @@ double inverse_mass(const SteppedBody& body) {
   return body.moves ? 1 / (body.scale.root_mass * body.scale.root_mass) : 0;
 }
 
+// Masses become so many times less as the square of `root`, a power of two.
+void measure_in(double root, SteppedBody& body) {
+  MassScale& scale = body.scale;
+  scale = {scale.root_mass / root, root * scale.inverse_root_mass, root * scale.spread};
+  body.velocity = 1 / root * body.velocity;
+  body.gravity = 1 / root * body.gravity;
+}
+
 // Bodies that impact has driven into each other may be held from both sides: what pushes one way makes the
 // other deeper, the pushes are hundreds of times their weight, and whichever point is found next throws
 // them about. So a deep contact pushes for what it is deeper than the same pair's contacts that push
@@ -90,6 +98,7 @@ Residual SoftSolver::solve(const StepInput& input, std::span<const std::uint32_t
   if (islands.empty()) return {};
   const Step step = {input, options, RowMaker(input, states, options), states, impulses};
   gather(step, islands);
+  find_unit(step);
   make_groups(step);
   fill(step);
   run(step);
@@ -152,6 +161,14 @@ std::vector<std::uint32_t> SoftSolver::find_regions(const Step& step, std::uint3
     for (std::size_t k = begin; k < end; ++k) out[order[k]] = region;
   }
   return out;
+}
+
+// Masses are measured in a unit about as large as the heaviest, so that float32 has room for the others, and
+// whose root is a power of two, so that no digit depends on it.
+void SoftSolver::find_unit(const Step& step) {
+  double most = 0;
+  for (std::size_t i = 1; i < body_.size(); ++i) most = std::max(most, step.input.bodies[body_[i]].mass);
+  unit_root_ = std::ldexp(1.0, std::ilogb(most) / 2);
 }
 
 // Gives each pair a place in a group of its colour and region, those with many contacts first, so that few
@@ -227,6 +244,7 @@ void SoftSolver::fill(const Step& step) {
   threads.for_parts(body_.size() - 1, kBodiesAtOnce, [&](std::size_t before) {
     const std::size_t i = before + 1;
     bodies_[i] = step.rows.body(body_[i]);
+    measure_in(unit_root_, bodies_[i]);
     put(step.h / bodies_[i].scale.root_mass * bodies_[i].gravity.linear, gains_[i].centre);
     put(step.h * bodies_[i].gravity.angular, gains_[i].spin);
   });
@@ -248,7 +266,7 @@ void SoftSolver::fill_pair(const Step& step, const Pair& pair) {
   const SteppedBody &a = bodies_[pair.a], &b = bodies_[pair.b];
   const std::span<const std::uint32_t> contacts =
       std::span(contacts_).subspan(pair.first_contact, pair.contacts);
-  const double substeps = step.options.substeps;
+  const double substeps = step.options.substeps * unit_root_ * unit_root_;  // in these masses
   SoftTurning& turns = turnings_[pair.group];
   if (a.moves) group.body_a[lane] = pair.a, put(a.scale, turns.spread_a, lane);
   if (b.moves) group.body_b[lane] = pair.b, put(b.scale, turns.spread_b, lane);
@@ -361,7 +379,7 @@ void SoftSolver::write(const Step& step, std::span<BodyState> states,
     apply_motion(step.input.bodies[body_[i]], body.scale, body.velocity + added(velocities_[i]),
                  step.input.dt * body.velocity + added(moved_[i]), step.input.dt, states[body_[i]]);
   });
-  const double substeps = step.options.substeps;
+  const double substeps = step.options.substeps * unit_root_ * unit_root_;
   step.input.threads.for_parts(pairs_.size(), kBodiesAtOnce, [&](std::size_t k) {
     const Pair& pair = pairs_[k];
     const SoftNumber(&turns)[3] = turnings_[pair.group].impulse;

@@ -51,6 +51,7 @@ class SoftSolver {
 
   static Softness softness(double frequency, double damping_ratio, double h);
   void gather(const Step& step, std::span<const std::uint32_t> islands);
+  void find_unit(const Step& step);
   std::vector<std::uint32_t> find_colours();
   std::vector<std::uint32_t> find_regions(const Step& step, std::uint32_t regions) const;
   void make_groups(const Step& step);
@@ -65,6 +66,7 @@ class SoftSolver {
   // Kept from step to step for their memory alone. The first of bodies stands for all that contacts do not
   // move.
   std::vector<std::uint32_t> body_, place_;  // of each place, and of each body of the step
+  double unit_root_ = 1;                     // of the unit of masses
   std::vector<SteppedBody> bodies_;
   std::vector<std::uint32_t> contacts_;
   std::vector<Pair> pairs_;

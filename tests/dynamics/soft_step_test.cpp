@@ -93,7 +93,8 @@ struct RandomRows {
       }
     }
     // Where nothing pushes, and a pair has no such contact.
-    for (std::size_t i = 0; i < normals.size(); i += 2) normals[i].impulse = {}, frictions[i].first_impulse = {};
+    for (std::size_t i = 0; i < normals.size(); i += 2)
+      normals[i].impulse = {}, frictions[i].first_impulse = {};
     for (std::size_t i = 0; i < normals.size(); i += 5) normals[i] = {}, frictions[i] = {};
   }
 
@@ -159,8 +160,8 @@ void expect_same(const std::vector<Thing>& is, const std::vector<Thing>& wanted,
 }
 
 TEST(SoftPasses, EveryVariantGivesTheSameBytes) {
-  const SoftPasses::Pass SoftPasses::*order[] = {&SoftPasses::start,   &SoftPasses::push,  &SoftPasses::follow,
-                                                 &SoftPasses::relax,   &SoftPasses::rub,   &SoftPasses::push,
+  const SoftPasses::Pass SoftPasses::*order[] = {&SoftPasses::start,   &SoftPasses::push, &SoftPasses::follow,
+                                                 &SoftPasses::relax,   &SoftPasses::rub,  &SoftPasses::push,
                                                  &SoftPasses::rebound, &SoftPasses::judge};
   const auto after = [&](const SoftPasses& passes) {
     RandomRows rows;

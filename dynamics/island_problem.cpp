@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "dynamics/island_joints.h"
+
 namespace tandem::dynamics {
 namespace {
 
@@ -23,19 +25,32 @@ class ProblemMaker {
  public:
   ProblemMaker(const StepInput& input, std::span<const BodyState> states, const SolverOptions& options,
                std::span<const std::uint32_t> layers, std::span<std::uint32_t> place)
-      : input_(input), states_(states), options_(options), layers_(layers), place_(place) {}
+      : input_(input), states_(states), options_(options), layers_(layers), place_(place) {
+    problem_.states = states;
+  }
 
-  IslandProblem make(std::size_t island, std::span<const ContactImpulse> impulses) {
+  IslandProblem make(std::size_t island, std::span<const ContactImpulse> impulses,
+                     std::span<const std::uint32_t> order) {
     add_unmoved();
-    const auto members = input_.islands.bodies_of(island);
+    const auto members = order.empty() ? input_.islands.bodies_of(island) : order;
     std::vector<std::uint32_t> bodies(members.begin(), members.end());
-    std::ranges::stable_sort(bodies, {}, [&](std::uint32_t body) { return layers_[body]; });
+    if (order.empty())
+      std::ranges::stable_sort(bodies, {}, [&](std::uint32_t body) { return layers_[body]; });
     for (const std::uint32_t body : bodies) add_body(body);
     find_deepest(input_.islands.contacts_of(island));
     const auto contacts = from_the_ground_up(input_.islands.contacts_of(island));
     reserve(contacts.size());
     for (const std::uint32_t contact : contacts) add_contact(contact, impulses[contact]);
     add_pairs(impulses);
+    const auto joints = input_.islands.joints_of(island);
+    problem_.joints.assign(joints.begin(), joints.end());
+    const auto place_of = [&](std::uint32_t body) {
+      return body != kNoIndex && is_moved(body) ? place_[body] : 0;
+    };
+    for (const std::uint32_t joint : joints) {
+      const Joint& of = input_.joints[joint];
+      add_joint_rows(problem_, input_, joint, place_of(of.a), place_of(of.b));
+    }
     return std::move(problem_);
   }
 
@@ -209,8 +224,21 @@ class ProblemMaker {
 
 IslandProblem make_island_problem(const StepInput& input, std::size_t island, const StepStart& start,
                                   const SolverOptions& options, std::span<const std::uint32_t> layers,
-                                  std::span<std::uint32_t> place) {
-  return ProblemMaker(input, start.states, options, layers, place).make(island, start.impulses);
+                                  std::span<std::uint32_t> place, std::span<const std::uint32_t> order) {
+  return ProblemMaker(input, start.states, options, layers, place).make(island, start.impulses, order);
+}
+
+BodyState state_at_end(const IslandProblem& problem, const StepInput& input, std::size_t place,
+                       const Vector6& velocity, const Vector6& displacement) {
+  const MassScale& scale = problem.scale[place];
+  const std::uint32_t body = problem.bodies[place];
+  BodyState state = problem.states[body];
+  state.velocity = velocity.linear / scale.root_mass;
+  state.angular_velocity = scale.spread * velocity.angular;
+  const Vector3 moved = displacement.linear / (scale.root_mass * input.dt);
+  const Vector3 turned = scale.spread * displacement.angular / input.dt;
+  advance(input.bodies[body], state, moved - state.velocity, turned - state.angular_velocity, input.dt);
+  return state;
 }
 
 Residual residual_of(const IslandProblem& problem, std::span<const double> target, double friction,
@@ -236,16 +264,8 @@ Residual residual_of(const IslandProblem& problem, std::span<const double> targe
 
 void apply_solution(const IslandProblem& problem, const StepInput& input, std::span<BodyState> states,
                     std::span<ContactImpulse> impulses) {
-  for (std::size_t i = 1; i < problem.bodies.size(); ++i) {
-    const MassScale& scale = problem.scale[i];
-    BodyState& state = states[problem.bodies[i]];
-    state.velocity = problem.velocity[i].linear / scale.root_mass;
-    state.angular_velocity = scale.spread * problem.velocity[i].angular;
-    const Vector3 moved = problem.displacement[i].linear / (scale.root_mass * input.dt);
-    const Vector3 turned = scale.spread * problem.displacement[i].angular / input.dt;
-    advance(input.bodies[problem.bodies[i]], state, moved - state.velocity, turned - state.angular_velocity,
-            input.dt);
-  }
+  for (std::size_t i = 1; i < problem.bodies.size(); ++i)
+    states[problem.bodies[i]] = state_at_end(problem, input, i, problem.velocity[i], problem.displacement[i]);
   for (std::size_t i = 0; i < problem.contact_count(); ++i) {
     const Vector3& impulse = problem.impulse[i];
     impulses[problem.contacts[i]] = {
@@ -256,6 +276,8 @@ void apply_solution(const IslandProblem& problem, const StepInput& input, std::s
     for (std::uint32_t i = pair.begin; i < pair.end; ++i)
       impulses[problem.contacts[i]].turning = pair.impulse / (pair.end - pair.begin);
   }
+  for (const JointRow& row : problem.joint_rows)
+    input.joint_memory[row.joint].impulse[row.slot] = row.impulse;
 }
 
 }  // namespace tandem::dynamics

@@ -1,15 +1,11 @@
 #include <algorithm>
 #include <cmath>
 
-#include "dynamics/island_problem.h"
+#include "dynamics/island_joints.h"
+#include "dynamics/joint_visit.h"
 
 namespace tandem::dynamics {
 namespace {
-
-// The numbers of a soft row, where bodies are too deep in each other.
-struct Softness {
-  double bias_rate, mass_scale, impulse_scale;
-};
 
 Softness softness(double frequency, double damping_ratio, double h) {
   const double omega = 2 * kPi * frequency;
@@ -21,6 +17,7 @@ class SoftStep {
  public:
   SoftStep(IslandProblem& problem, const StepInput& input, const SolverOptions& options)
       : p_(problem),
+        input_(input),
         contacts_(input.contacts),
         slop_(options.slop),
         friction_(options.friction),
@@ -28,7 +25,8 @@ class SoftStep {
         substeps_(options.substeps),
         h_(input.dt / options.substeps),
         between_movers_(softness(1 / (8 * h_), 10, h_)),
-        against_unmoved_(softness(2 / (8 * h_), 5, h_)) {}
+        against_unmoved_(softness(2 / (8 * h_), 5, h_)),
+        joints_(softness(2 / (8 * h_), 5, h_)) {}
 
   void solve() {
     constexpr int kRelaxingSweeps = 2;
@@ -41,14 +39,19 @@ class SoftStep {
         start[j] = p_.velocity[j] + h_ * p_.gravity[j];
         p_.velocity[j] = start[j] + pushed_[j];
       }
+      for (const JointBlock& joint : blocks_) visit_joint(joint, p_.joint_rows, p_.velocity, h_, &joints_);
       for (std::size_t i = 0; i < contacts; ++i) visit_soft(i);
       for (std::size_t j = 1; j < bodies; ++j) p_.displacement[j] += h_ * p_.velocity[j];
+      follow_joints((k + 1) * h_);
       for (int sweep = 0; sweep < kRelaxingSweeps; ++sweep) {
+        for (const JointBlock& joint : blocks_) visit_joint(joint, p_.joint_rows, p_.velocity, h_, nullptr);
         for (std::size_t i = 0; i < contacts; ++i) relax(i, (k + 1) * h_);
       }
       for (std::size_t i = 0; i < contacts; ++i) visit_friction(i);
       for (TouchingPair& pair : p_.pairs) visit_turning(pair);
       for (std::size_t j = 1; j < bodies; ++j) pushed_[j] = p_.velocity[j] - start[j];
+      // The next substep starts with the impulses of joints as its own rows have them.
+      for (std::size_t j = 1; j < turned_.size(); ++j) pushed_[j] += turned_[j];
     }
     constexpr int kRestitutionSweeps = 10;
     for (int k = 0; k < kRestitutionSweeps; ++k) {
@@ -56,6 +59,7 @@ class SoftStep {
     }
     for (Vector3& impulse : p_.impulse) impulse = substeps_ * impulse;
     for (TouchingPair& pair : p_.pairs) pair.impulse = substeps_ * pair.impulse;
+    for (JointRow& row : p_.joint_rows) row.impulse = substeps_ * row.impulse;
   }
 
   // Condition: solve() was called.
@@ -86,6 +90,12 @@ class SoftStep {
       pushed_[p_.a[pair.begin]] += pair.change_of_a(pair.impulse);
       pushed_[p_.b[pair.begin]] += pair.change_of_b(pair.impulse);
     }
+    blocks_ = joint_blocks(p_.joint_rows);
+    for (JointRow& row : p_.joint_rows) {
+      for (double* of_step : {&row.impulse, &row.least_push, &row.most_push}) *of_step /= substeps_;
+      pushed_[row.a] += row.impulse * row.gradient.a;
+      pushed_[row.b] += row.impulse * row.gradient.b;
+    }
   }
 
   // Bodies that impact has driven into each other may be held from both sides: what pushes one way makes the
@@ -107,6 +117,22 @@ class SoftStep {
         }
         opposed_[i] = std::min(opposed, -deep - p_.separation[i]);
       }
+    }
+  }
+
+  void follow_joints(double time) {
+    if (blocks_.empty()) return;
+    turned_.assign(p_.bodies.size(), Vector6{});
+    add_impulses(-1);
+    dynamics::follow_joints(p_, input_, p_.displacement, time, p_.joint_rows);
+    for (JointBlock& joint : blocks_) factorise(joint, p_.joint_rows);
+    add_impulses(1);
+  }
+
+  void add_impulses(double sign) {
+    for (const JointRow& row : p_.joint_rows) {
+      turned_[row.a] += sign * row.impulse * row.gradient.a;
+      turned_[row.b] += sign * row.impulse * row.gradient.b;
     }
   }
 
@@ -176,12 +202,15 @@ class SoftStep {
   }
 
   IslandProblem& p_;
+  const StepInput& input_;
   std::span<const ContactPoint> contacts_;
   double slop_;
   double friction_, rolling_resistance_;
   std::uint32_t substeps_;
   double h_;
-  Softness between_movers_, against_unmoved_;
+  Softness between_movers_, against_unmoved_, joints_;
+  std::vector<JointBlock> blocks_;
+  std::vector<Vector6> turned_;  // what joints' impulses would give more had their rows been those of the end
   std::vector<double> normal_mass_, friction_mass_;
   std::vector<double> followed_;   // separations as they change
   std::vector<double> opposed_;    // by how much depth the push is less

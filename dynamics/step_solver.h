@@ -5,6 +5,7 @@
 #include <span>
 
 #include "dynamics/islands.h"
+#include "dynamics/joint.h"
 #include "dynamics/threads.h"
 
 namespace tandem::dynamics {
@@ -34,12 +35,14 @@ struct SolverOptions {
 struct StepInput {
   std::span<const BodyProperties> bodies;
   std::span<const ContactPoint> contacts;
-  const Islands& islands;  ///< of these contacts
+  const Islands& islands;  ///< of these contacts and joints
   double dt;
   Vector3 gravity;
   std::uint64_t number;  ///< of the step
   bool is_cold;          ///< there are no impulses of a step before
   Threads& threads;
+  std::span<const Joint> joints = {};
+  std::span<JointMemory> joint_memory = {};  ///< impulses of the step before, and then of this one
 };
 
 /// Says what a solution leaves undone: the natural map of the complementarity problem, row by row the

@@ -88,8 +88,7 @@ void follow_joints(const IslandProblem& problem, const StepInput& input,
 
 JointSpan::JointSpan(const IslandProblem& problem, const StepInput& input)
     : problem_(problem), input_(input), last_(problem.joints.size()), end_(problem.joint_rows.size()) {
-  for (const std::uint32_t joint : problem.joints)
-    first_.push_back(geometry_at_start(problem, input, joint));
+  for (const std::uint32_t joint : problem.joints) first_.push_back(geometry_at_start(problem, input, joint));
 }
 
 void JointSpan::end_with(const std::vector<Vector6>& velocity, const std::vector<Vector6>& displacement) {

@@ -50,13 +50,13 @@ struct JointRow {
   std::uint32_t joint;  ///< by place in StepInput::joints
   JointRowKind kind;
   std::uint8_t slot;
-  std::uint32_t a, b;              ///< places of its bodies
-  ContactRow gradient;             ///< of w, but for its drive
-  double drive;                    ///< by bodies that move and are not moved
-  double least_way, most_way;      ///< see JointDirection
-  double speed;                    ///< that a motor asks for
-  double least_push, most_push;    ///< bounds of the impulse of a whole step
-  double impulse;                  ///< as a whole step would need it
+  std::uint32_t a, b;            ///< places of its bodies
+  ContactRow gradient;           ///< of w, but for its drive
+  double drive;                  ///< by bodies that move and are not moved
+  double least_way, most_way;    ///< see JointDirection
+  double speed;                  ///< that a motor asks for
+  double least_push, most_push;  ///< bounds of the impulse of a whole step
+  double impulse;                ///< as a whole step would need it
 
   double along(const std::vector<Vector6>& y) const { return dot(gradient.a, y[a]) + dot(gradient.b, y[b]); }
 };
@@ -118,8 +118,8 @@ struct StepStart {
 };
 
 /// Bodies and contacts come by ascending layer (find_layers()), these of their lower body, so that a sweep
-/// goes up from the ground; where there is an order of the island's bodies, bodies come by it. place: for each
-/// body of the step a number that this may change.
+/// goes up from the ground; where there is an order of the island's bodies, bodies come by it. place: for
+/// each body of the step a number that this may change.
 IslandProblem make_island_problem(const StepInput& input, std::size_t island, const StepStart& start,
                                   const SolverOptions& options, std::span<const std::uint32_t> layers,
                                   std::span<std::uint32_t> place, std::span<const std::uint32_t> order = {});
@@ -146,7 +146,7 @@ Residual solve_soft_step(IslandProblem& problem, const StepInput& input, const S
 
 /// Says which directions joints act in during a step of Newton's method.
 enum class JointRule : std::uint8_t {
-  exact,   ///< those of the middle of the step, which keep energy; it fails where bodies turn too far for that
+  exact,  ///< those of the middle of the step, which keep energy; it fails where bodies turn too far for that
   damped,  ///< those of its start
 };
 

@@ -34,8 +34,8 @@ struct Islands {
 Islands find_islands(std::span<const BodyProperties> bodies, std::span<const ContactPoint> contacts,
                      std::span<const ObjectPair> joined = {});
 
-/// Returns for each body the fewest contacts and joints between it and one that nothing can move: 0 for such a body, and
-/// the largest number for a body that hangs on none.
+/// Returns for each body the fewest contacts and joints between it and one that nothing can move: 0 for such
+/// a body, and the largest number for a body that hangs on none.
 std::vector<std::uint32_t> find_layers(std::span<const BodyProperties> bodies,
                                        std::span<const ContactPoint> contacts,
                                        std::span<const ObjectPair> joined = {});

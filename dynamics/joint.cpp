@@ -102,9 +102,9 @@ JointGeometry geometry_of(const Joint& joint, const BodyState& a, const BodyStat
 
 JointGeometry middle(const JointGeometry& p, const JointGeometry& q) {
   const auto mean = [](const Vector3& x, const Vector3& y) { return 0.5 * (x + y); };
-  return {mean(p.arm_a, q.arm_a), mean(p.arm_b, q.arm_b), mean(p.apart, q.apart), mean(p.axis, q.axis),
-          mean(p.first, q.first), mean(p.second, q.second), mean(p.tilt, q.tilt),
-          0.5 * (p.position + q.position)};
+  return {mean(p.arm_a, q.arm_a), mean(p.arm_b, q.arm_b),         mean(p.apart, q.apart),
+          mean(p.axis, q.axis),   mean(p.first, q.first),         mean(p.second, q.second),
+          mean(p.tilt, q.tilt),   0.5 * (p.position + q.position)};
 }
 
 double free_speed(const Joint& joint, const JointGeometry& g, const BodyState& a, const BodyState& b) {
@@ -122,9 +122,9 @@ double free_speed(const Joint& joint, const JointGeometry& g, const BodyState& a
 }
 
 void follow(const Joint& joint, const BodyState& a, const BodyState& b, double time, JointMemory& memory) {
-  const double speed = joint.kind == JointKind::hinge
-                           ? dot(rotated(a.orientation, joint.axis_a), b.angular_velocity - a.angular_velocity)
-                           : 0;
+  const double speed = joint.kind == JointKind::hinge ? dot(rotated(a.orientation, joint.axis_a),
+                                                            b.angular_velocity - a.angular_velocity)
+                                                      : 0;
   memory.position = geometry_of(joint, a, b, memory.position + time * speed).position;
 }
 
@@ -161,8 +161,7 @@ Status check(const JointDescription& from) {
               (may_be_limited || !has_limits) &&
               (has_axis(from.kind) || (from.speed == 0 && from.most_effort == 0));
   good = good && is_finite(vector_of(from.anchor)) && is_finite(vector_of(from.axis));
-  if (from.kind == JointKind::distance)
-    good = good && is_finite(vector_of(from.anchor_b)) && from.most >= 0;
+  if (from.kind == JointKind::distance) good = good && is_finite(vector_of(from.anchor_b)) && from.most >= 0;
   if (!good) return Status::kBadJoint;
   return has_axis(from.kind) && !(norm(vector_of(from.axis)) > 0) ? Status::kNoAxis : Status::kOk;
 }

@@ -19,8 +19,8 @@ struct Softness {
 struct JointBlock {
   static constexpr std::uint32_t kMostHeld = 6;
 
-  std::uint32_t begin, held_end, end;      ///< in IslandProblem::joint_rows
-  double lower[kMostHeld][kMostHeld];      ///< L L^T: how impulses of those held change their w
+  std::uint32_t begin, held_end, end;  ///< in IslandProblem::joint_rows
+  double lower[kMostHeld][kMostHeld];  ///< L L^T: how impulses of those held change their w
 };
 
 /// Sets `lower`, for rows as they are now.
@@ -80,8 +80,8 @@ inline void visit_free_row(JointRow& row, std::vector<Vector6>& velocity, double
 }
 
 /// Changes the impulses of a joint's rows, and the velocities of its bodies, by one visit of a sweep. The
-/// rows' impulses and bounds are those of a substep of length h, their ways those that are left now. soft: how
-/// what is out of place comes back; null: it does not, and only velocities are mended.
+/// rows' impulses and bounds are those of a substep of length h, their ways those that are left now. soft:
+/// how what is out of place comes back; null: it does not, and only velocities are mended.
 inline void visit_joint(const JointBlock& block, std::span<JointRow> rows, std::vector<Vector6>& velocity,
                         double h, const Softness* soft) {
   for (std::uint32_t i = block.held_end; i < block.end; ++i) visit_free_row(rows[i], velocity, h, soft);
@@ -99,8 +99,7 @@ inline void visit_joint(const JointBlock& block, std::span<JointRow> rows, std::
   }
   for (std::uint32_t i = 0; i < held; ++i) {
     JointRow& row = rows[block.begin + i];
-    push(row, velocity,
-         soft != nullptr ? soft->mass_scale * x[i] - soft->impulse_scale * row.impulse : x[i]);
+    push(row, velocity, soft != nullptr ? soft->mass_scale * x[i] - soft->impulse_scale * row.impulse : x[i]);
   }
 }
 

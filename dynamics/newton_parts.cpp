@@ -48,8 +48,9 @@ class Parts {
                                std::span<std::uint32_t> place, std::span<const std::uint32_t> order,
                                JointRule rule, std::span<ContactImpulse> impulses, bool* turned_far) {
     const double dt = input_.dt / count_;
-    const StepInput part = {input_.bodies, contacts_,        one_,           dt,            input_.gravity,
-                            input_.number, input_.is_cold,   input_.threads, input_.joints, input_.joint_memory};
+    const StepInput part = {input_.bodies,  contacts_,          one_,           dt,
+                            input_.gravity, input_.number,      input_.is_cold, input_.threads,
+                            input_.joints,  input_.joint_memory};
     IslandProblem problem = make_island_problem(part, 0, {states_, impulses}, options, layers, place, order);
     const std::optional<Residual> residual = solve_newton_step(problem, part, options, rule, turned_far);
     if (!residual) return {};

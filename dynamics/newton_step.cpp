@@ -74,8 +74,8 @@ void divide_by_transposed(Matrix6& m, const Matrix6& lower) {
   }
 }
 
-// A sparse symmetric matrix of 6 x 6 blocks: one for each body of an island and one for each two that touch or
-// are joined, and its Cholesky factors. Bodies are eliminated in their order (make_island_problem()): by
+// A sparse symmetric matrix of 6 x 6 blocks: one for each body of an island and one for each two that touch
+// or are joined, and its Cholesky factors. Bodies are eliminated in their order (make_island_problem()): by
 // ascending layer, so that the matrix is a band, or in one that elimination_order() has found.
 class BlockMatrix {
  public:
@@ -217,7 +217,7 @@ struct ConvexGoal {
   std::vector<double> turning_bound;  // of what resists turning
   std::vector<JointGoal> joint;       // of each row
   std::vector<Vector6> near;          // y that the least is to be near to,
-  std::vector<Matrix3> nearness;      // by half the square in this metric of how far spins are from it; or empty
+  std::vector<Matrix3> nearness;  // by half the square in this metric of how far spins are from it; or empty
 };
 
 // Velocities y of an island that make the strictly convex function
@@ -226,13 +226,12 @@ struct ConvexGoal {
 //                    + sum over pairs of     R_s H(l_s - w_s/R_s)
 //                    + sum over rows of joints  R_j/2 of the square of an impulse, held within its bounds
 //
-// least. The impulse of a joint's row is l_j + (low - w_j)/R_j where that is more than 0, l_j + (high - w_j)/R_j
-// where that is less, and 0 between; low = high of what is held. w: velocities of a contact, of a pair's
-// turning, and of a joint's row; R: `softness` times what an impulse of 1
-// changes them by; H: half the square up to the bound, linear from there on (Huber), so that neither
-// friction nor what resists turning depends on the impulse along the normal. The impulses are the
-// derivatives. Where y is to be near to others, what that adds is of no moment once it is there. Newton's
-// method on sparse LDL^T, with exact line search.
+// least. The impulse of a joint's row is l_j + (low - w_j)/R_j where that is more than 0, l_j + (high -
+// w_j)/R_j where that is less, and 0 between; low = high of what is held. w: velocities of a contact, of a
+// pair's turning, and of a joint's row; R: `softness` times what an impulse of 1 changes them by; H: half the
+// square up to the bound, linear from there on (Huber), so that neither friction nor what resists turning
+// depends on the impulse along the normal. The impulses are the derivatives. Where y is to be near to others,
+// what that adds is of no moment once it is there. Newton's method on sparse LDL^T, with exact line search.
 class ConvexContacts {
  public:
   explicit ConvexContacts(const IslandProblem& problem)
@@ -373,7 +372,8 @@ class ConvexContacts {
         matrix_.add(j, 0, drawn, of, 1);
       }
     }
-    const auto add = [&](std::size_t contact, const ContactRow& left, const ContactRow& right, double weight) {
+    const auto add = [&](std::size_t contact, const ContactRow& left, const ContactRow& right,
+                         double weight) {
       matrix_.add(problem_.a[contact], problem_.b[contact], left, right, weight);
     };
     for (std::size_t i = 0; i < problem_.contact_count(); ++i) {
@@ -560,19 +560,19 @@ class NewtonStep {
   }
 
  private:
-  // The directions in which joints act turn with the bodies. Rows that are those of the middle of the step, and
-  // velocities that obey the joints where the bodies then are, keep energy and angular momentum to second
+  // The directions in which joints act turn with the bodies. Rows that are those of the middle of the step,
+  // and velocities that obey the joints where the bodies then are, keep energy and angular momentum to second
   // order; but both are known only once the step is solved. So it is solved again with what is known of them,
   // each time nearer by a factor of about the angle that bodies turn in a step.
   bool solve_with_joints() {
-    constexpr int kMostRounds = 6;
+    constexpr int kMostJointRounds = 6;
     constexpr double kGood = 0.1, kUsable = 10;  // times what velocities of contacts may still change
     constexpr double kNearer = 0.5;
     for (std::size_t j = 1; j < end_.size(); ++j) end_[j] += input_.dt * problem_.gravity[j];
     mean_ = mean_velocity();
     joints_.end_with(end_, displacement());
     double worst = INFINITY, change = 0;
-    for (int round = 0; round < kMostRounds && worst > kGood * change; ++round) {
+    for (int round = 0; round < kMostJointRounds && worst > kGood * change; ++round) {
       const double before = worst;
       joints_.set_middle_rows(contacts_.joint_rows());
       find_shifts();
@@ -625,8 +625,8 @@ class NewtonStep {
     std::vector<Vector6> mean = problem_.velocity;
     for (std::size_t j = 1; j < mean.size(); ++j) mean[j] = 0.5 * (mean[j] + end_[j]);
     if (joints_.empty() || mean_.empty()) return mean;
-    // advance() turns a body by its spin at the end; the half of what it gained is to be that of an inertia in
-    // the middle of the step, so that the step is as good backwards as forwards.
+    // advance() turns a body by its spin at the end; the half of what it gained is to be that of an inertia
+    // in the middle of the step, so that the step is as good backwards as forwards.
     for (std::size_t j = 1; j < mean.size(); ++j) {
       const MassScale& scale = problem_.scale[j];
       const std::uint32_t body = problem_.bodies[j];
@@ -812,8 +812,7 @@ class NewtonStep {
     for (const double s : problem_.separation)
       goal.target.push_back(-(s < 0 ? options_.correction : 1) * s / input_.dt);
     goal.impulse = {std::vector<Vector3>(problem_.contact_count(), Vector3{}),
-                    std::vector<Vector3>(problem_.pairs.size(), Vector3{}),
-                    way_impulse_};
+                    std::vector<Vector3>(problem_.pairs.size(), Vector3{}), way_impulse_};
     for (std::size_t i = 0; i < problem_.joint_rows.size(); ++i) {
       const JointRow& row = problem_.joint_rows[i];
       const double push = row.kind == JointRowKind::motor ? 0 : INFINITY;
@@ -835,7 +834,7 @@ class NewtonStep {
   ConvexContacts contacts_;
   JointSpan joints_;
   std::vector<double> velocity_shift_, way_shift_, way_impulse_;  // see find_shifts()
-  std::vector<Matrix3> stiffness_;                           // of joints; empty until there is any
+  std::vector<Matrix3> stiffness_;                                // of joints; empty until there is any
   bool turned_far_ = false;
   std::uint32_t left_ = kMostFactorisations;
   std::vector<double> target_;

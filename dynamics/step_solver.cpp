@@ -82,8 +82,7 @@ class IslandSolver final : public StepSolver {
           make_island_problem(input, i, {states, impulses}, options_, layers, place_, plan.order);
       std::optional<Residual> newton;
       bool turned_far = false;
-      if (plan.by_newton)
-        newton = solve_newton_step(problem, input, options_, JointRule::exact, &turned_far);
+      if (plan.by_newton) newton = solve_newton_step(problem, input, options_, JointRule::exact, &turned_far);
       const bool is_whole = newton.has_value();
       if (turned_far) newton = solve_in_parts(input, i, plan, layers, states, impulses);
       by_newton += newton ? 1 : 0;

@@ -60,7 +60,7 @@ class World {
   }
 
   void set_bodies(nb::handle instances, const Filter* filter, nb::handle density, nb::handle velocity,
-                  nb::handle angular_velocity) {
+                  nb::handle angular_velocity, nb::handle joints) {
     const Turn turn = take_turn();
     const auto rows = copy_rows<tandem_instance>(instances);
     const std::vector<double> densities = numbers_of(density, rows.size(), 1),
@@ -71,6 +71,8 @@ class World {
     if (!densities.empty()) start.density = densities.data();
     if (!velocities.empty()) start.velocity = velocities.data();
     if (!angular.empty()) start.angular_velocity = angular.data();
+    const auto joined = copy_rows<tandem_joint>(joints);
+    start.joints = joined.data(), start.joint_count = joined.size();
     ask([&](tandem_world* world) {
       return tandem_world_set_bodies(world, rows.data(), rows.size(), Filter::of(filter), &start);
     });
@@ -109,6 +111,12 @@ class World {
 
   nb::object bodies() { return rows<tandem_world_bodies>(); }
   nb::object contacts() { return rows<tandem_world_contacts>(); }
+  nb::object joints() { return rows<tandem_world_joints>(); }
+
+  void set_motor(std::uint32_t joint, double speed, double most_effort) {
+    const Turn turn = take_turn();
+    ask([&](tandem_world* world) { return tandem_world_set_motor(world, joint, speed, most_effort); });
+  }
 
   std::size_t count() {
     const Turn turn = take_turn();
@@ -183,12 +191,14 @@ void add_worlds(nb::module_& module) {
                     bool, std::uint32_t>(),
            nb::arg(), nb::arg(), nb::arg(), nb::arg(), none(), none(), nb::arg(), nb::arg(), nb::arg(),
            nb::arg())
-      .def("set_bodies", &World::set_bodies, nb::arg(), none(), none(), none(), none())
+      .def("set_bodies", &World::set_bodies, nb::arg(), none(), none(), none(), none(), nb::arg())
       .def("step", &World::step)
       .def("set_body", &World::set_body)
       .def("push", &World::push)
       .def("bodies", &World::bodies)
       .def("contacts", &World::contacts)
+      .def("joints", &World::joints)
+      .def("set_motor", &World::set_motor)
       .def("count", &World::count)
       .def("time", &World::time)
       .def("masses", &World::masses)

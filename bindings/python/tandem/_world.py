@@ -1,7 +1,8 @@
 """Worlds: rigid bodies that move under gravity and contacts."""
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -11,13 +12,64 @@ from ._arrays import Rotations, Rows, amount, flag, floats, instances_of, number
 from ._asset import Asset
 from ._errors import Error
 from ._poses import explained
-from ._rows import BODY_MOTION, INSTANCE, WORLD_CONTACT
+from ._rows import BODY_MOTION, INSTANCE, JOINT, NO_INDEX, WORLD_CONTACT, WORLD_JOINT
 from ._scene import Filter, _core_of, cores_of
 
-__all__ = ["World", "WorldState"]
+__all__ = ["Joint", "World", "WorldState"]
 
 _MOST = 1e6  # of options that are numbers
 _Numbers = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Joint:
+    """Two bodies, of which at least one moves, joined as they are placed. Anchors and axis are those of the world at that time, and the bodies carry them along.
+
+    Args:
+        kind: "ball" turns about the anchor; "hinge" about an axis through it, by an angle; "slider" moves along the axis, by a way; "fixed" not at all; "distance"
+            keeps how far the two anchors are apart, such as a rod or a rope.
+        a, b: bodies; None: the world.
+        anchor: (3,), where they are joined; of a distance, the point of a.
+        anchor_b: (3,), of a distance alone: the point of b.
+        axis: (3,), of a hinge or slider, of any length.
+        limits: least and most of the angle or way, which is 0 as the bodies are placed, or of the distance, which without limits stays what it is; may be
+            infinite.
+        speed: that the motor of a hinge or slider drives b at, against a.
+        most_effort: its greatest torque or force; 0: there is no motor.
+        may_touch: the two bodies have contacts with each other.
+    """
+
+    kind: str
+    a: int | None
+    b: int | None
+    anchor: npt.ArrayLike
+    anchor_b: npt.ArrayLike = (0.0, 0.0, 0.0)
+    axis: npt.ArrayLike = (0.0, 0.0, 1.0)
+    limits: tuple[float, float] | None = None
+    speed: float = 0.0
+    most_effort: float = 0.0
+    may_touch: bool = False
+
+
+_KINDS = ("ball", "hinge", "slider", "fixed", "distance")
+
+
+def _joint_rows(joints: Sequence[Joint]) -> Rows:
+    rows = np.zeros(len(joints), JOINT)
+    for row, joint in zip(rows, joints):
+        if joint.kind not in _KINDS:
+            raise ValueError(f"kind is {joint.kind!r} where one of {', '.join(_KINDS)} is wanted")
+        row["kind"] = _KINDS.index(joint.kind)
+        for name, body in (("a", joint.a), ("b", joint.b)):
+            row[name] = NO_INDEX if body is None else whole_number(body, name, 0, NO_INDEX - 1)
+        row["anchor"], row["anchor_b"] = _vector(joint.anchor, "anchor"), _vector(joint.anchor_b, "anchor_b")
+        row["axis"] = _vector(joint.axis, "axis")
+        if joint.limits is not None:
+            row["has_limits"] = 1
+            row["least"], row["most"] = joint.limits
+        row["speed"], row["most_effort"] = number(joint.speed, "speed"), number(joint.most_effort, "most_effort")
+        row["may_touch"] = flag(joint.may_touch, "may_touch")
+    return rows
 
 
 class WorldState:
@@ -58,8 +110,8 @@ class World:
 
     Args:
         assets: that bodies refer to by their place in this list. The world keeps them.
-        instances, filter, asset, rotation, translation, transform, density, velocity, angular_velocity: bodies, as of `place`; none where none of the poses is
-            given.
+        instances, filter, asset, rotation, translation, transform, density, velocity, angular_velocity, joints: bodies, as of `place`; none where none of the
+            poses is given.
         gravity: (3,).
         friction: Coulomb's coefficient.
         restitution: part of the speed that an impact gives back, 0 to 1.
@@ -84,7 +136,7 @@ class World:
     def __init__(self, assets: Iterable[Asset], instances: Rows | None = None, *, filter: Filter | None = None, asset: npt.ArrayLike | None = None,
                  rotation: Rotations | None = None, translation: npt.ArrayLike | None = None, transform: npt.ArrayLike | None = None,
                  density: npt.ArrayLike = 1000.0, velocity: npt.ArrayLike | None = None, angular_velocity: npt.ArrayLike | None = None,
-                 gravity: npt.ArrayLike = (0.0, 0.0, -9.81), friction: float = 0.5, restitution: float = 0.0, slop: float | None = None,
+                 joints: Sequence[Joint] = (), gravity: npt.ArrayLike = (0.0, 0.0, -9.81), friction: float = 0.5, restitution: float = 0.0, slop: float | None = None,
                  rolling_resistance: float | None = None, substeps: int = 16, sleeping: bool = True, continuous: bool = False, threads: int = 1):
         self._core = _tandem.World(
             cores_of(assets), _gravity(gravity), amount(friction, "friction", _MOST), amount(restitution, "restitution", 1.0),
@@ -94,13 +146,13 @@ class World:
         self._asset = np.zeros(0, np.uint32)
         if not (instances is None and asset is None and rotation is None and translation is None and transform is None):
             self.place(instances, filter=filter, asset=asset, rotation=rotation, translation=translation, transform=transform, density=density, velocity=velocity,
-                       angular_velocity=angular_velocity)
-        elif filter is not None or velocity is not None or angular_velocity is not None:
+                       angular_velocity=angular_velocity, joints=joints)
+        elif filter is not None or velocity is not None or angular_velocity is not None or joints:
             raise TypeError("instances is missing, or asset, rotation, translation or transform")
 
     def place(self, instances: Rows | None = None, *, filter: Filter | None = None, asset: npt.ArrayLike | None = None, rotation: Rotations | None = None,
               translation: npt.ArrayLike | None = None, transform: npt.ArrayLike | None = None, density: npt.ArrayLike = 1000.0,
-              velocity: npt.ArrayLike | None = None, angular_velocity: npt.ArrayLike | None = None) -> World:
+              velocity: npt.ArrayLike | None = None, angular_velocity: npt.ArrayLike | None = None, joints: Sequence[Joint] = ()) -> World:
         """Places all bodies anew, at time 0. Returns the world.
 
         Args:
@@ -109,17 +161,19 @@ class World:
             density: () or (n,), of bodies that move. The mass is that of what the mesh encloses; an open mesh is a shell, a hundredth of its diagonal thick.
             velocity: (3,) or (n, 3), of the centre of mass; 0 where it is not given.
             angular_velocity: (3,) or (n, 3); 0 where it is not given.
+            joints: between these bodies, and with the world.
 
         Raises:
-            Error: as of `Scene.place`; a velocity that is not finite; a moving body whose mesh has no topology or no extent, or whose density is not positive. There
-                are no bodies then.
+            Error: as of `Scene.place`; a velocity that is not finite; a moving body whose mesh has no topology or no extent, or whose density is not positive; a
+                joint of a body that there is not, of two that nothing moves, without an axis, or with numbers that its kind cannot have. There are no bodies then.
         """
         bodies = instances_of(instances, asset, rotation, translation, transform)
         given = (_of_each(density, "density", len(bodies)), _of_each(velocity, "velocity", len(bodies), 3),
                  _of_each(angular_velocity, "angular_velocity", len(bodies), 3))
+        joined = _joint_rows(joints)
         self._asset = np.zeros(0, np.uint32)
         try:
-            self._core.set_bodies(bodies, _core_of(filter), *given)
+            self._core.set_bodies(bodies, _core_of(filter), *given, joined)
         except Error as error:
             raise explained(error, bodies) from None
         self._asset = bodies["asset"].copy()
@@ -179,6 +233,11 @@ class World:
         """
         row = self._body(body)
         self._core.push(row, _vector(impulse, "impulse"), np.ascontiguousarray(self.bodies["centre"][row]) if at is None else _vector(at, "at"))
+
+    def set_motor(self, joint: int, speed: float, most_effort: float) -> None:
+        """Gives the motor of a hinge or slider another speed and greatest torque or force, and wakes the bodies. Error, where `where` is the joint: there is none
+        such, or it has no motor."""
+        self._core.set_motor(whole_number(joint, "joint", 0, NO_INDEX), number(speed, "speed"), number(most_effort, "most_effort"))
 
     def save(self) -> WorldState:
         """Keeps all that the next steps depend on."""
@@ -259,6 +318,18 @@ class World:
         [0.0, 0.0, 9810.0]
         """
         return np.frombuffer(self._core.contacts(), WORLD_CONTACT)
+
+    @property
+    def joints(self) -> Rows:
+        """What the joints did in the last step, a copy, array of WORLD_JOINT in the order they were given: angle, way or distance, its speed, and impulses.
+
+        >>> rod = tandem.Joint("ball", None, 0, anchor=[0, 0, 5])
+        >>> world = tandem.World([box], translation=[[0, 0, 4]], joints=[rod])
+        >>> world.step(1 / 60)
+        >>> (world.joints["impulse"][0] * 60 / world.mass[0]).round(2).tolist()
+        [0.0, 0.0, 9.81]
+        """
+        return np.frombuffer(self._core.joints(), WORLD_JOINT)
 
     @property
     def time(self) -> float:

@@ -85,8 +85,8 @@ struct WorldOptions {
   std::uint32_t threads = 1;       ///< from 1 to kMostSceneThreads; no result depends on it
 };
 
-/// Rigid bodies of meshes that move under gravity, contacts and joints. Contacts are those of ContactQuery and
-/// ManifoldQuery, exact for any mesh; docs/dynamics.md says how they are solved and what holds. Throws
+/// Rigid bodies of meshes that move under gravity, contacts and joints. Contacts are those of ContactQuery
+/// and ManifoldQuery, exact for any mesh; docs/dynamics.md says how they are solved and what holds. Throws
 /// nothing. Movable, not copyable. One call at a time; several worlds may be used side by side. The same
 /// calls give the same bytes, for any number of threads.
 class World {

@@ -61,7 +61,10 @@ class RowMaker {
       : input_(input), states_(states), options_(options) {}
 
   SteppedBody body(std::uint32_t body) const;
-  bool is_moved(std::uint32_t body) const { return input_.bodies[body].motion == Motion::moving; }
+  /// body: kNoIndex is one that is not.
+  bool is_moved(std::uint32_t body) const {
+    return body != kNoIndex && input_.bodies[body].motion == Motion::moving;
+  }
 
   /// Calls add(i, rows) for each contact of a pair, by place in `contacts`. a, b: its bodies. impulses: of
   /// all contacts of the step.

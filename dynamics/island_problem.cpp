@@ -4,17 +4,21 @@
 #include <cmath>
 #include <utility>
 
+#include "dynamics/island_joints.h"
+
 namespace tandem::dynamics {
 namespace {
 
 class ProblemMaker {
  public:
   ProblemMaker(const StepInput& input, const StepStart& start, const SolverOptions& options)
-      : input_(input), impulses_(start.impulses), rows_(input, start.states, options) {}
+      : input_(input), impulses_(start.impulses), rows_(input, start.states, options) {
+    problem_.states = start.states;
+  }
 
   // Contacts of a pair are side by side. place: of each body of the step.
   IslandProblem make(std::vector<std::uint32_t> bodies, std::vector<std::uint32_t> contacts,
-                     std::span<std::uint32_t> place) {
+                     std::span<const std::uint32_t> joints, std::span<std::uint32_t> place) {
     bodies.insert(bodies.begin(), 0);
     bodies_.resize(bodies.size());
     make_room(bodies.size(), contacts.size());
@@ -26,14 +30,18 @@ class ProblemMaker {
       problem_.gravity[i] = bodies_[i].gravity;
     }
     problem_.bodies = std::move(bodies), problem_.contacts = std::move(contacts);
+    const auto place_of = [&](std::uint32_t body) { return rows_.is_moved(body) ? place[body] : 0; };
     const auto count = static_cast<std::uint32_t>(problem_.contact_count());
     for (std::uint32_t begin = 0, end = 0; begin < count; begin = end) {
       const ContactPoint& contact = contact_of(begin);
       const ObjectPair pair = {contact.body_a, contact.body_b};
       while (end < count && ObjectPair{contact_of(end).body_a, contact_of(end).body_b} == pair) ++end;
-      add_pair(begin, end, rows_.is_moved(pair.a) ? place[pair.a] : 0,
-               rows_.is_moved(pair.b) ? place[pair.b] : 0);
+      add_pair(begin, end, place_of(pair.a), place_of(pair.b));
     }
+    problem_.joints.assign(joints.begin(), joints.end());
+    for (const std::uint32_t joint : joints)
+      add_joint_rows(problem_, input_, joint, place_of(input_.joints[joint].a),
+                     place_of(input_.joints[joint].b));
     return std::move(problem_);
   }
 
@@ -99,13 +107,15 @@ std::vector<std::uint32_t> from_the_ground_up(std::span<const std::uint32_t> thi
 
 IslandProblem make_island_problem(const StepInput& input, std::size_t island, const StepStart& start,
                                   const SolverOptions& options, std::span<const std::uint32_t> layers,
-                                  std::span<std::uint32_t> place) {
-  const auto bodies =
-      from_the_ground_up(input.islands.bodies_of(island), [&](std::uint32_t body) { return layers[body]; });
+                                  std::span<std::uint32_t> place, std::span<const std::uint32_t> order) {
   const auto contacts = from_the_ground_up(input.islands.contacts_of(island), [&](std::uint32_t i) {
     return std::min(layers[input.contacts[i].body_a], layers[input.contacts[i].body_b]);
   });
-  return ProblemMaker(input, start, options).make(bodies, contacts, place);
+  auto bodies = std::vector<std::uint32_t>(order.begin(), order.end());
+  if (order.empty())
+    bodies =
+        from_the_ground_up(input.islands.bodies_of(island), [&](std::uint32_t body) { return layers[body]; });
+  return ProblemMaker(input, start, options).make(bodies, contacts, input.islands.joints_of(island), place);
 }
 
 Residual residual_of(const IslandProblem& problem, std::size_t i, double target, double share) {
@@ -126,13 +136,18 @@ Residual residual_of(const IslandProblem& problem, std::size_t i, double target,
   return out;
 }
 
+BodyState state_at_end(const IslandProblem& problem, const StepInput& input, std::size_t place,
+                       const Vector6& velocity, const Vector6& displacement) {
+  const std::uint32_t body = problem.bodies[place];
+  BodyState state = problem.states[body];
+  apply_motion(input.bodies[body], problem.scale[place], velocity, displacement, input.dt, state);
+  return state;
+}
+
 void apply_solution(const IslandProblem& problem, const StepInput& input, std::span<BodyState> states,
                     std::span<ContactImpulse> impulses) {
-  for (std::size_t i = 1; i < problem.bodies.size(); ++i) {
-    const std::uint32_t body = problem.bodies[i];
-    apply_motion(input.bodies[body], problem.scale[i], problem.velocity[i], problem.displacement[i], input.dt,
-                 states[body]);
-  }
+  for (std::size_t i = 1; i < problem.bodies.size(); ++i)
+    states[problem.bodies[i]] = state_at_end(problem, input, i, problem.velocity[i], problem.displacement[i]);
   for (const TouchingPair& pair : problem.pairs) {
     for (std::uint32_t i = pair.begin; i < pair.end; ++i) {
       const Vector3& impulse = problem.impulse[i];
@@ -141,6 +156,8 @@ void apply_solution(const IslandProblem& problem, const StepInput& input, std::s
           pair.impulse / (pair.end - pair.begin)};
     }
   }
+  for (const JointRow& row : problem.joint_rows)
+    input.joint_memory[row.joint].impulse[row.slot] = row.impulse;
 }
 
 }  // namespace tandem::dynamics

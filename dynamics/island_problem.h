@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "dynamics/contact_rows.h"
+#include "dynamics/joint.h"
 
 namespace tandem::dynamics {
 
@@ -29,6 +30,22 @@ struct TouchingPair {
   }
 };
 
+/// A direction in which a joint acts, and the impulse there.
+struct JointRow {
+  std::uint32_t joint;  ///< by place in StepInput::joints
+  JointRowKind kind;
+  std::uint8_t slot;
+  std::uint32_t a, b;            ///< places of its bodies
+  ContactRow gradient;           ///< of w, but for its drive
+  double drive;                  ///< by bodies that move and are not moved
+  double least_way, most_way;    ///< see JointDirection
+  double speed;                  ///< that a motor asks for
+  double least_push, most_push;  ///< bounds of the impulse of a whole step
+  double impulse;                ///< as a whole step would need it
+
+  double along(const std::vector<Vector6>& y) const { return dot(gradient.a, y[a]) + dot(gradient.b, y[b]); }
+};
+
 /// The bodies and contacts of one island in arrays, for one step: inertia, arms and directions stay those of
 /// its start. Bodies are known by their place here; 0 stands for all that contacts do not move, whose y is 0.
 struct IslandProblem {
@@ -48,6 +65,10 @@ struct IslandProblem {
   std::vector<Vector3> impulse;    ///< along normal, first, second, as a whole step would need it
 
   std::vector<TouchingPair> pairs;
+
+  std::span<const BodyState> states;  ///< of all bodies of the step, at its start
+  std::vector<std::uint32_t> joints;  ///< by place in StepInput::joints
+  std::vector<JointRow> joint_rows;   ///< in the order of joints
 
   std::size_t contact_count() const { return contacts.size(); }
   double along(const ContactRow& row, std::size_t contact, const std::vector<Vector6>& y) const {
@@ -81,15 +102,26 @@ struct StepStart {
   std::span<const ContactImpulse> impulses;
 };
 
-/// Bodies and contacts come by ascending layer (find_layers()), these of their lower
-/// body: from the ground up. place: for each body of the step a number that this may change.
+/// Bodies and contacts come by ascending layer (find_layers()), these of their lower body, so that a sweep
+/// goes up from the ground; where there is an order of the island's bodies, bodies come by it. place: for
+/// each body of the step a number that this may change.
 IslandProblem make_island_problem(const StepInput& input, std::size_t island, const StepStart& start,
                                   const SolverOptions& options, std::span<const std::uint32_t> layers,
-                                  std::span<std::uint32_t> place);
+                                  std::span<std::uint32_t> place, std::span<const std::uint32_t> order = {});
+
+/// Returns the state at the end of the step of the body at a place, of this velocity and displacement.
+BodyState state_at_end(const IslandProblem& problem, const StepInput& input, std::size_t place,
+                       const Vector6& velocity, const Vector6& displacement);
 
 /// Moves the island's bodies by the displacement, gives them the velocities, and hands out the impulses.
 void apply_solution(const IslandProblem& problem, const StepInput& input, std::span<BodyState> states,
                     std::span<ContactImpulse> impulses);
+
+/// Says which directions joints act in during a step of Newton's method.
+enum class JointRule : std::uint8_t {
+  exact,  ///< those of the middle of the step, which keep energy; it fails where bodies turn too far for that
+  damped,  ///< those of its start
+};
 
 /// Solves a step of a whole island to convergence, in passes. Each finds the velocities that make the
 /// function of ConvexContacts least, with the impulses and the bounds of friction that the pass before ended
@@ -103,8 +135,10 @@ void apply_solution(const IslandProblem& problem, const StepInput& input, std::s
 /// what is deeper. The mean makes sliding and stopping right to second order.
 ///
 /// Results, if it converged: velocity, displacement and impulse of the problem, and what is left undone; else
-/// nothing, and these stay what they were.
+/// nothing, and these stay what they were. turned_far: or null; becomes whether it did not because bodies of
+/// joints turned too far.
 std::optional<Residual> solve_newton_step(IslandProblem& problem, const StepInput& input,
-                                          const SolverOptions& options);
+                                          const SolverOptions& options, JointRule rule = JointRule::exact,
+                                          bool* turned_far = nullptr);
 
 }  // namespace tandem::dynamics

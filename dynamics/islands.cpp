@@ -30,48 +30,63 @@ void group(const std::vector<std::uint32_t>& island_of, std::size_t islands,
   }
 }
 
+// Calls take(a, b) for the bodies of each contact and joint.
+template <typename Take>
+void for_each_link(std::span<const ContactPoint> contacts, std::span<const ObjectPair> joined,
+                   const Take& take) {
+  for (const ContactPoint& contact : contacts) take(contact.body_a, contact.body_b);
+  for (const ObjectPair& pair : joined) take(pair.a, pair.b);
+}
+
 }  // namespace
 
-Islands find_islands(std::span<const BodyProperties> bodies, std::span<const ContactPoint> contacts) {
+Islands find_islands(std::span<const BodyProperties> bodies, std::span<const ContactPoint> contacts,
+                     std::span<const ObjectPair> joined) {
   UnionFind sets(bodies.size());
-  for (const ContactPoint& contact : contacts) {
-    if (moves(bodies[contact.body_a]) && moves(bodies[contact.body_b]))
-      sets.join(contact.body_a, contact.body_b);
-  }
+  for_each_link(contacts, joined, [&](std::uint32_t a, std::uint32_t b) {
+    if (a != kNone && b != kNone && moves(bodies[a]) && moves(bodies[b])) sets.join(a, b);
+  });
   std::uint32_t count = 0;
   std::vector<std::uint32_t> island_of_body(bodies.size(), kNone), island_of_contact(contacts.size(), kNone);
+  std::vector<std::uint32_t> island_of_joint(joined.size(), kNone);
   for (std::uint32_t i = 0; i < bodies.size(); ++i) {
     if (!moves(bodies[i])) continue;
     const std::uint32_t first = sets.find(i);  // never after i
     island_of_body[i] = first == i ? count++ : island_of_body[first];
   }
-  for (std::size_t i = 0; i < contacts.size(); ++i) {
-    const std::uint32_t a = island_of_body[contacts[i].body_a], b = island_of_body[contacts[i].body_b];
-    island_of_contact[i] = a != kNone ? a : b;
-  }
+  const auto island_of = [&](std::uint32_t a, std::uint32_t b) {
+    const std::uint32_t first = a != kNone ? island_of_body[a] : kNone;
+    return first != kNone || b == kNone ? first : island_of_body[b];
+  };
+  for (std::size_t i = 0; i < contacts.size(); ++i)
+    island_of_contact[i] = island_of(contacts[i].body_a, contacts[i].body_b);
+  for (std::size_t i = 0; i < joined.size(); ++i) island_of_joint[i] = island_of(joined[i].a, joined[i].b);
   Islands islands;
   group(island_of_body, count, islands.bodies, islands.body_begin);
   group(island_of_contact, count, islands.contacts, islands.contact_begin);
+  group(island_of_joint, count, islands.joints, islands.joint_begin);
   return islands;
 }
 
 std::vector<std::uint32_t> find_layers(std::span<const BodyProperties> bodies,
-                                       std::span<const ContactPoint> contacts) {
-  std::vector<std::uint32_t> layer(bodies.size(), kNone), front, next;
-  for (std::uint32_t i = 0; i < bodies.size(); ++i) {
-    if (!moves(bodies[i])) layer[i] = 0;
+                                       std::span<const ContactPoint> contacts,
+                                       std::span<const ObjectPair> joined) {
+  // The world follows the bodies.
+  const auto world = static_cast<std::uint32_t>(bodies.size());
+  std::vector<std::uint32_t> layer(bodies.size() + 1, kNone), front, next;
+  for (std::uint32_t i = 0; i <= world; ++i) {
+    if (i == world || !moves(bodies[i])) layer[i] = 0, front.push_back(i);
   }
-  std::vector<std::uint32_t> degree(bodies.size() + 1, 0), neighbours(2 * contacts.size());
-  for (const ContactPoint& contact : contacts) ++degree[contact.body_a + 1], ++degree[contact.body_b + 1];
+  std::vector<std::uint32_t> degree(bodies.size() + 2, 0), neighbours(2 * (contacts.size() + joined.size()));
+  for_each_link(contacts, joined, [&](std::uint32_t a, std::uint32_t b) {
+    ++degree[std::min(a, world) + 1], ++degree[std::min(b, world) + 1];
+  });
   std::partial_sum(degree.begin(), degree.end(), degree.begin());
   std::vector<std::uint32_t> place(degree.begin(), degree.end() - 1);
-  for (const ContactPoint& contact : contacts) {
-    neighbours[place[contact.body_a]++] = contact.body_b;
-    neighbours[place[contact.body_b]++] = contact.body_a;
-  }
-  for (std::uint32_t i = 0; i < bodies.size(); ++i) {
-    if (layer[i] == 0) front.push_back(i);
-  }
+  for_each_link(contacts, joined, [&](std::uint32_t a, std::uint32_t b) {
+    neighbours[place[std::min(a, world)]++] = std::min(b, world);
+    neighbours[place[std::min(b, world)]++] = std::min(a, world);
+  });
   for (; !front.empty(); front.swap(next), next.clear()) {
     for (const std::uint32_t i : front) {
       for (std::uint32_t at = degree[i]; at < degree[i + 1]; ++at) {
@@ -82,6 +97,7 @@ std::vector<std::uint32_t> find_layers(std::span<const BodyProperties> bodies,
       }
     }
   }
+  layer.pop_back();
   return layer;
 }
 
@@ -90,15 +106,14 @@ void Sleep::start(std::size_t bodies) {
   group_.assign(bodies, kAwake);
 }
 
-void Sleep::wake_touched(std::span<const BodyProperties> bodies, std::span<const ContactPoint> contacts) {
+void Sleep::wake_touched(std::span<const BodyProperties> bodies, std::span<const ContactPoint> contacts,
+                         std::span<const ObjectPair> joined) {
   std::vector<std::uint32_t> touched;
-  for (const ContactPoint& contact : contacts) {
-    const bool a = sleeps(contact.body_a), b = sleeps(contact.body_b);
-    if (a == b) continue;
+  for_each_link(contacts, joined, [&](std::uint32_t a, std::uint32_t b) {
+    if (a == kNone || b == kNone || sleeps(a) == sleeps(b)) return;
     // A fixed body wakes nobody.
-    const std::uint32_t other = a ? contact.body_b : contact.body_a;
-    if (bodies[other].motion != Motion::fixed) touched.push_back(a ? contact.body_a : contact.body_b);
-  }
+    if (bodies[sleeps(a) ? b : a].motion != Motion::fixed) touched.push_back(sleeps(a) ? a : b);
+  });
   for (const std::uint32_t body : touched) wake(body);
 }
 
@@ -112,10 +127,12 @@ void Sleep::wake(std::uint32_t body) {
 }
 
 void Sleep::fall_asleep(std::span<const BodyProperties> bodies, std::span<BodyState> states,
-                        const Islands& islands, const SleepOptions& options, double dt) {
+                        const Islands& islands, const SleepOptions& options, double dt,
+                        std::span<const std::uint8_t> driven) {
   for (std::size_t island = 0; island < islands.size(); ++island) {
     const auto members = islands.bodies_of(island);
-    bool all = !islands.contacts_of(island).empty();  // what flies does not sleep
+    bool all = !islands.flies(island);
+    for (const std::uint32_t joint : islands.joints_of(island)) all = all && driven[joint] == 0;
     for (const std::uint32_t i : members) {
       const double speed = norm(states[i].velocity) + bodies[i].radius * norm(states[i].angular_velocity);
       quiet_[i] = speed <= options.speed ? quiet_[i] + dt : 0;

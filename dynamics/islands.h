@@ -4,14 +4,16 @@
 #include <vector>
 
 #include "dynamics/contact_point.h"
+#include "tandem/kernels/object_pair.h"
 
 namespace tandem::dynamics {
 
-/// Bodies that push each other through contacts, and those contacts. Islands share no dynamic body, so they
+/// Bodies that push each other through contacts and joints, and those. Islands share no dynamic body, so they
 /// can be solved side by side.
 struct Islands {
   std::vector<std::uint32_t> bodies, body_begin;  ///< island i: bodies[body_begin[i]] ... [body_begin[i + 1])
   std::vector<std::uint32_t> contacts, contact_begin;  ///< the same of contacts
+  std::vector<std::uint32_t> joints, joint_begin;      ///< and of joints
 
   std::size_t size() const { return body_begin.empty() ? 0 : body_begin.size() - 1; }
   std::span<const std::uint32_t> bodies_of(std::size_t island) const {
@@ -20,16 +22,23 @@ struct Islands {
   std::span<const std::uint32_t> contacts_of(std::size_t island) const {
     return {contacts.data() + contact_begin[island], contact_begin[island + 1] - contact_begin[island]};
   }
+  std::span<const std::uint32_t> joints_of(std::size_t island) const {
+    return {joints.data() + joint_begin[island], joint_begin[island + 1] - joint_begin[island]};
+  }
+  bool flies(std::size_t island) const { return contacts_of(island).empty() && joints_of(island).empty(); }
 };
 
-/// Every dynamic body is in one island, those without contacts alone. Bodies, contacts and islands (by their
-/// first body) come in ascending order. Contacts between bodies that nothing can move are in none.
-Islands find_islands(std::span<const BodyProperties> bodies, std::span<const ContactPoint> contacts);
+/// Every dynamic body is in one island, those without contacts and joints alone. Bodies, contacts, joints and
+/// islands (by their first body) come in ascending order. Contacts and joints between bodies that nothing can
+/// move are in none. joined: the bodies of each joint; kNoIndex is the world.
+Islands find_islands(std::span<const BodyProperties> bodies, std::span<const ContactPoint> contacts,
+                     std::span<const ObjectPair> joined = {});
 
-/// Returns for each body the fewest contacts between it and one that nothing can move: 0 for such a body, and
-/// the largest number for a body that hangs on none.
+/// Returns for each body the fewest contacts and joints between it and one that nothing can move: 0 for such
+/// a body, and the largest number for a body that hangs on none.
 std::vector<std::uint32_t> find_layers(std::span<const BodyProperties> bodies,
-                                       std::span<const ContactPoint> contacts);
+                                       std::span<const ContactPoint> contacts,
+                                       std::span<const ObjectPair> joined = {});
 
 struct SleepOptions {
   bool enabled = false;
@@ -38,7 +47,7 @@ struct SleepOptions {
 };
 
 /// Decides which bodies sleep. An island falls asleep as a whole, and wakes as a whole in the step after a
-/// body that is awake has touched it; until then it is like a fixed one.
+/// body that is awake has touched it or been joined to it; until then it is like a fixed one.
 class Sleep {
  public:
   static constexpr std::uint32_t kAwake = 0xFFFFFFFFu;
@@ -46,16 +55,19 @@ class Sleep {
   /// Begins with all bodies awake.
   void start(std::size_t bodies);
 
-  /// Bodies that are woken by contacts with bodies that are awake: to be called with the contacts of each
-  /// step, at its end. Clears the mark of sleep of their groups.
-  void wake_touched(std::span<const BodyProperties> bodies, std::span<const ContactPoint> contacts);
+  /// Bodies that are woken by contacts with bodies that are awake, and by joints with them: to be called with
+  /// the contacts of each step, at its end. Clears the mark of sleep of their groups.
+  void wake_touched(std::span<const BodyProperties> bodies, std::span<const ContactPoint> contacts,
+                    std::span<const ObjectPair> joined = {});
 
   /// Wakes a body and its group.
   void wake(std::uint32_t body);
 
-  /// Counts how long bodies have been quiet, and lets islands fall asleep: their velocities become 0.
+  /// Counts how long bodies have been quiet, and lets islands fall asleep: their velocities become 0. driven:
+  /// for each joint whether a motor moves it, which keeps its island awake.
   void fall_asleep(std::span<const BodyProperties> bodies, std::span<BodyState> states,
-                   const Islands& islands, const SleepOptions& options, double dt);
+                   const Islands& islands, const SleepOptions& options, double dt,
+                   std::span<const std::uint8_t> driven = {});
 
   bool sleeps(std::uint32_t body) const { return group_[body] != kAwake; }
   std::size_t count() const;

@@ -30,7 +30,11 @@ Simulation::Simulation(std::vector<BodyProperties> bodies, std::vector<BodyState
       states_(std::move(states)),
       parts_(std::move(parts)),
       options_(options),
-      threads_(options.threads) {
+      threads_(options.threads),
+      joints_(std::move(parts_.joints)),
+      joint_memory_(joints_.size()) {
+  for (const Joint& joint : joints_) joined_.push_back({joint.a, joint.b});
+  follow_joints(0);
   if (parts_.solver == nullptr) parts_.solver = make_step_solver(options.solver);
   sleep_.start(bodies_.size());
 }
@@ -86,13 +90,15 @@ void Simulation::find_contacts(StepRecord& record) {
 
 void Simulation::solve(StepRecord& record) {
   const std::span<const ContactPoint> contacts = cache_.contacts();
-  islands_ = find_islands(acting_, contacts);
+  islands_ = find_islands(acting_, contacts, joined_);
   std::vector<ContactImpulse> impulses(contacts.size());
   if (options_.solver.warm_start) impulses = cache_.impulses();
   const std::vector<BodyState> before = parts_.continuous ? states_ : std::vector<BodyState>();
-  parts_.solver->step({acting_, contacts, islands_, options_.dt, pulls_, step_, cache_.is_cold(), threads_},
+  parts_.solver->step({acting_, contacts, islands_, options_.dt, pulls_, step_, cache_.is_cold(), threads_,
+                       joints_, joint_memory_},
                       states_, impulses);
   if (parts_.continuous) parts_.continuous->limit(acting_, before, states_, options_.solver.slop);
+  follow_joints(options_.dt);
   cache_.remember(impulses);
   touches_.update(contacts, impulses, idle());
   record.residual_max = parts_.solver->statistics().residual;
@@ -103,8 +109,10 @@ void Simulation::solve(StepRecord& record) {
 
 void Simulation::sleep() {
   if (!options_.sleep.enabled) return;
-  sleep_.wake_touched(acting_, cache_.contacts());
-  sleep_.fall_asleep(bodies_, states_, islands_, options_.sleep, options_.dt);
+  std::vector<std::uint8_t> driven;
+  for (const Joint& joint : joints_) driven.push_back(joint.speed != 0 && joint.most_effort > 0);
+  sleep_.wake_touched(acting_, cache_.contacts(), joined_);
+  sleep_.fall_asleep(bodies_, states_, islands_, options_.sleep, options_.dt, driven);
   update_acting();
 }
 
@@ -161,6 +169,21 @@ void Simulation::set_force(std::uint32_t body, const BodyForce& force) {
   update_acting();
 }
 
+void Simulation::follow_joints(double time) {
+  for (std::size_t i = 0; i < joints_.size(); ++i) {
+    const Joint& joint = joints_[i];
+    follow(joint, state_of(joint.a, states_), state_of(joint.b, states_), time, joint_memory_[i]);
+  }
+}
+
+void Simulation::set_motor(std::uint32_t joint, double speed, double most_effort) {
+  joints_[joint].speed = speed, joints_[joint].most_effort = most_effort;
+  for (const std::uint32_t body : {joints_[joint].a, joints_[joint].b}) {
+    if (body != kNoIndex) sleep_.wake(body);
+  }
+  update_acting();
+}
+
 SimulationState Simulation::save() const {
   const auto entries = cache_.entries();
   const auto posed = parts_.contacts->posed();
@@ -174,7 +197,9 @@ SimulationState Simulation::save() const {
           {quiet.begin(), quiet.end()},
           {groups.begin(), groups.end()},
           forces_,
-          {touching.begin(), touching.end()}};
+          {touching.begin(), touching.end()},
+          joints_,
+          joint_memory_};
 }
 
 void Simulation::restore(SimulationState state) {
@@ -185,6 +210,8 @@ void Simulation::restore(SimulationState state) {
   sleep_.restore(std::move(state.quiet), std::move(state.groups));
   forces_ = std::move(state.forces);
   touches_.restore(std::move(state.touching));
+  joints_ = std::move(state.joints);
+  joint_memory_ = std::move(state.joint_memory);
   update_acting();
 }
 

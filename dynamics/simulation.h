@@ -53,6 +53,8 @@ struct SimulationState {
   std::vector<std::uint32_t> groups;  ///< of Sleep
   std::vector<BodyForce> forces;      ///< empty: there are none
   std::vector<ObjectPair> touching;   ///< of Touches
+  std::vector<Joint> joints;          ///< with what their motors ask for
+  std::vector<JointMemory> joint_memory;
 };
 
 /// What a simulation is made of, beside its bodies.
@@ -62,6 +64,7 @@ struct SimulationParts {
   std::unique_ptr<ContinuousMotion> continuous = nullptr;  ///< what keeps fast bodies from passing through
                                                            ///< others; null: nothing does
   std::unique_ptr<StepSolver> solver = nullptr;            ///< null: that of the options
+  std::vector<Joint> joints = {};
 };
 
 /// Moves rigid bodies, step by step: contacts where the bodies stand, velocities with gravity, contacts
@@ -96,6 +99,13 @@ class Simulation {
 
   /// The pairs of bodies that touched in the last step.
   const Touches& touches() const { return touches_; }
+  std::span<const Joint> joints() const { return joints_; }
+
+  /// What each joint did in the last step, and where it is.
+  std::span<const JointMemory> joint_memory() const { return joint_memory_; }
+
+  /// Gives a joint's motor another target and greatest effort, and wakes what it joins.
+  void set_motor(std::uint32_t joint, double speed, double most_effort);
 
   bool sleeps(std::uint32_t body) const { return sleep_.sleeps(body); }
 
@@ -110,6 +120,7 @@ class Simulation {
   void solve(StepRecord& record);
   void sleep();
   void update_acting();
+  void follow_joints(double time);
   std::vector<std::uint8_t> idle() const;
   void take_measures(StepRecord& record) const;
 
@@ -118,6 +129,9 @@ class Simulation {
   SimulationParts parts_;
   SimulationOptions options_;
   Threads threads_;
+  std::vector<Joint> joints_;
+  std::vector<ObjectPair> joined_;  // the bodies of each
+  std::vector<JointMemory> joint_memory_;
   Islands islands_;
   std::vector<ContactPoint> found_;
   ContactCache cache_;

@@ -58,6 +58,12 @@ void measure_in(double root, SteppedBody& body) {
   body.gravity = 1 / root * body.gravity;
 }
 
+Softness softness(double frequency, double damping_ratio, double h) {
+  const double omega = 2 * kPi * frequency;
+  const double a1 = 2 * damping_ratio + h * omega, a2 = h * omega * a1;
+  return {omega / a1, a2 / (1 + a2), 1 / (1 + a2)};
+}
+
 // Bodies that impact has driven into each other may be held from both sides: what pushes one way makes the
 // other deeper, the pushes are hundreds of times their weight, and whichever point is found next throws
 // them about. So a deep contact pushes for what it is deeper than the same pair's contacts that push
@@ -83,14 +89,9 @@ struct SoftSolver::Step {
   std::span<const BodyState> states;
   std::span<const ContactImpulse> impulses;
   double h = input.dt / options.substeps;
-  Softness between_movers = softness(1 / (8 * h), 10, h), against_unmoved = softness(2 / (8 * h), 5, h);
+  Softness between_movers = softness(1 / (8 * h), 10, h), against_unmoved = softness(2 / (8 * h), 5, h),
+           joints = against_unmoved;
 };
-
-SoftSolver::Softness SoftSolver::softness(double frequency, double damping_ratio, double h) {
-  const double omega = 2 * kPi * frequency;
-  const double a1 = 2 * damping_ratio + h * omega, a2 = h * omega * a1;
-  return {omega / a1, a2 / (1 + a2), 1 / (1 + a2)};
-}
 
 Residual SoftSolver::solve(const StepInput& input, std::span<const std::uint32_t> islands,
                            const SolverOptions& options, std::span<BodyState> states,
@@ -101,8 +102,10 @@ Residual SoftSolver::solve(const StepInput& input, std::span<const std::uint32_t
   find_unit(step);
   make_groups(step);
   fill(step);
+  joints_.start(input, islands, states, place_, bodies_, options.substeps, unit_root_ * unit_root_);
   run(step);
   write(step, states, impulses);
+  joints_.write(input.joint_memory);
   return residual();
 }
 
@@ -178,7 +181,7 @@ void SoftSolver::make_groups(const Step& step) {
   constexpr std::uint32_t kGroupsOfThread =
       4;  // of a colour: fewer are not worth that threads wait for others
   const std::vector<std::uint32_t> colours = find_colours();
-  const std::uint32_t colour_count = *std::ranges::max_element(colours) + 1;
+  const std::uint32_t colour_count = colours.empty() ? 1 : *std::ranges::max_element(colours) + 1;
   const auto most =
       static_cast<std::uint32_t>(pairs_.size() / (std::size_t{colour_count} * kSoftWidth * kGroupsOfThread));
   const std::uint32_t regions = std::clamp(most, 1u, step.input.threads.count());
@@ -320,13 +323,21 @@ void SoftSolver::run(const Step& step) {
     for (const SweepPart& part : parts_) phases.push_back({Work::pass, part, pass, static_cast<float>(time)});
   };
   static const SoftPasses& passes = *best_way<const SoftPasses*>(soft_passes);
+  const auto add_joints = [&](Work work, double time = 0) {
+    if (!joints_.empty()) phases.push_back({work, {}, nullptr, static_cast<float>(time)});
+  };
   add_sweep(passes.start);
+  add_joints(Work::push_joints);
   for (std::uint32_t k = 0; k < step.options.substeps; ++k) {
     phases.push_back({k == 0 ? Work::begin : Work::accelerate});
+    add_joints(Work::visit_soft_joints);
     add_sweep(passes.push);
     phases.push_back({Work::move});
-    add_sweep(passes.follow, (k + 1) * step.h);
-    for (int sweep = 1; sweep < kRelaxingSweeps; ++sweep) add_sweep(passes.relax);
+    add_joints(Work::follow_joints, (k + 1) * step.h);
+    for (int sweep = 0; sweep < kRelaxingSweeps; ++sweep) {
+      add_joints(Work::visit_joints);
+      add_sweep(sweep == 0 ? passes.follow : passes.relax, (k + 1) * step.h);
+    }
     add_sweep(passes.rub);
   }
   if (std::ranges::any_of(groups_, &SoftPairs::bounces)) {
@@ -339,7 +350,9 @@ void SoftSolver::run(const Step& step) {
   run_phases(step.input.threads, regions_, phases.size(),
              [&](std::size_t phase, std::uint32_t i, std::uint32_t n) {
                const auto& [work, part, pass, time] = phases[phase];
-               if (work != Work::pass) {
+               if (work > Work::move) {
+                 if (i == 0) work_on_joints(step, work, time);
+               } else if (work != Work::pass) {
                  const auto [begin, end] = part_of(body_.size(), i, n);
                  for (std::size_t j = begin; j < end; ++j) visit_body(j, work, static_cast<float>(step.h));
                } else if (part.region_begin != nullptr) {
@@ -366,6 +379,14 @@ void SoftSolver::visit_body(std::size_t i, Work work, float h) {
     visit(gains_[i].centre[k], start_[i].centre[k], velocities_[i].centre[k], moved_[i].centre[k]);
     visit(gains_[i].spin[k], start_[i].spin[k], velocities_[i].spin[k], moved_[i].spin[k]);
   }
+}
+
+void SoftSolver::work_on_joints(const Step& step, Work work, double time) {
+  if (work == Work::push_joints) return joints_.push(velocities_);
+  if (work == Work::follow_joints) return joints_.follow(moved_, time);
+  if (work == Work::visit_joints) return joints_.visit(velocities_, step.h, nullptr);
+  joints_.add_due(velocities_);
+  joints_.visit(velocities_, step.h, &step.joints);
 }
 
 void SoftSolver::write(const Step& step, std::span<BodyState> states,

@@ -5,6 +5,7 @@
 
 #include "dynamics/contact_rows.h"
 #include "dynamics/pair_colours.h"
+#include "dynamics/soft_joints.h"
 #include "dynamics/soft_rows.h"
 
 namespace tandem::dynamics {
@@ -23,9 +24,9 @@ namespace tandem::dynamics {
 /// the start of the step.
 class SoftSolver {
  public:
-  /// Solves the contacts of islands together. states: those at the start of the step, and then at its end.
-  /// impulses: those of all contacts, to start with and then the solution. Result: what the last substep
-  /// leaves undone.
+  /// Solves the contacts and joints of islands together. states: those at the start of the step, and then at
+  /// its end. impulses: those of all contacts, to start with and then the solution. Result: what the last
+  /// substep leaves undone.
   Residual solve(const StepInput& input, std::span<const std::uint32_t> islands, const SolverOptions& options,
                  std::span<BodyState> states, std::span<ContactImpulse> impulses);
 
@@ -37,19 +38,23 @@ class SoftSolver {
     std::uint32_t group;
     int lane;
   };
-  /// The numbers of a soft row, where bodies are too deep in each other.
-  struct Softness {
-    double bias_rate, mass_scale, impulse_scale;
+  enum class Work : std::uint8_t {
+    pass,
+    begin,
+    accelerate,
+    move,
+    push_joints,
+    visit_soft_joints,
+    follow_joints,
+    visit_joints,
   };
   /// The groups of a colour, region by region, or those of several that one thread visits.
   struct SweepPart {
     std::uint32_t begin, end;
     const std::uint32_t* region_begin;  ///< null: of several colours
   };
-  enum class Work : std::uint8_t { pass, begin, accelerate, move };
   struct Step;
 
-  static Softness softness(double frequency, double damping_ratio, double h);
   void gather(const Step& step, std::span<const std::uint32_t> islands);
   void find_unit(const Step& step);
   std::vector<std::uint32_t> find_colours();
@@ -60,6 +65,7 @@ class SoftSolver {
   void fill_pair(const Step& step, const Pair& pair);
   void run(const Step& step);
   void visit_body(std::size_t body, Work work, float h);
+  void work_on_joints(const Step& step, Work work, double time);
   void write(const Step& step, std::span<BodyState> states, std::span<ContactImpulse> impulses) const;
   Residual residual() const;
 
@@ -76,6 +82,7 @@ class SoftSolver {
   std::vector<std::uint32_t> region_begin_;  // of its groups, for each colour
   std::uint32_t regions_ = 1;                // as many as threads
   std::vector<SweepPart> parts_;
+  SoftJoints joints_;
   std::vector<SoftPairs> groups_;
   std::vector<SoftTurning> turnings_;
   std::vector<SoftNormal> normals_;

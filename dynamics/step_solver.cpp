@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "dynamics/elimination_order.h"
 #include "dynamics/island_problem.h"
+#include "dynamics/newton_parts.h"
 #include "dynamics/soft_step.h"
 
 namespace tandem::dynamics {
@@ -20,8 +22,8 @@ void fly(const StepInput& input, std::uint32_t body, std::span<BodyState> states
 // Returns whether factorising the island's matrix costs no more than what Newton's method has to do for each
 // contact: with bodies by layer the matrix is a band, and eliminating w bodies that hang together with as
 // many of the next layer takes about (6 w)^3 multiplications.
+constexpr double kForAContact = 3000;
 bool is_slender(const Islands& islands, std::size_t island, std::span<const std::uint32_t> layers) {
-  constexpr double kForAContact = 3000;
   std::vector<std::uint32_t> layer;
   for (const std::uint32_t body : islands.bodies_of(island)) layer.push_back(layers[body]);
   std::sort(layer.begin(), layer.end());
@@ -34,8 +36,31 @@ bool is_slender(const Islands& islands, std::size_t island, std::span<const std:
   return work <= kForAContact * static_cast<double>(islands.contacts_of(island).size());
 }
 
-// Solves islands by Newton's method each by itself, and all others together; bodies that no contact holds
-// fly.
+// An order that eliminates the bodies of an island with joints. Layers say little of these: a robot that no
+// contact holds has none, and its arms do not hang together. Result: nothing if it takes more than `most`
+// multiplications. place: for each body of the step a number that this may change.
+std::optional<std::vector<std::uint32_t>> order_of_joined(const StepInput& input, std::size_t island,
+                                                          double most, std::span<std::uint32_t> place) {
+  const auto bodies = input.islands.bodies_of(island);
+  for (std::uint32_t i = 0; i < bodies.size(); ++i) place[bodies[i]] = i;
+  const auto is_moved = [&](std::uint32_t body) {
+    return body != kNoIndex && input.bodies[body].motion == Motion::moving;
+  };
+  std::vector<ObjectPair> links;
+  const auto link = [&](std::uint32_t a, std::uint32_t b) {
+    if (is_moved(a) && is_moved(b)) links.push_back({place[a], place[b]});
+  };
+  for (const std::uint32_t i : input.islands.contacts_of(island))
+    link(input.contacts[i].body_a, input.contacts[i].body_b);
+  for (const std::uint32_t i : input.islands.joints_of(island)) link(input.joints[i].a, input.joints[i].b);
+  auto order = elimination_order(bodies.size(), links, most);
+  if (order) {
+    for (std::uint32_t& body : *order) body = bodies[body];
+  }
+  return order;
+}
+
+// Solves islands by Newton's method each by itself, and all others together; bodies that nothing holds fly.
 class IslandSolver final : public StepSolver {
  public:
   explicit IslandSolver(const SolverOptions& options) : options_(options) {}
@@ -43,24 +68,32 @@ class IslandSolver final : public StepSolver {
   void step(const StepInput& input, std::span<BodyState> states,
             std::span<ContactImpulse> impulses) override {
     place_.resize(input.bodies.size());
-    const std::vector<std::uint32_t> layers = find_layers(input.bodies, input.contacts);
+    std::vector<ObjectPair> joined;
+    for (const Joint& joint : input.joints) joined.push_back({joint.a, joint.b});
+    const std::vector<std::uint32_t> layers = find_layers(input.bodies, input.contacts, joined);
     const StepStart start = {states, impulses};
     std::vector<std::optional<Residual>> by_newton(input.islands.size());
     input.threads.for_each(input.islands.size(), [&](std::size_t i) {
-      if (input.islands.contacts_of(i).empty()) {
+      if (input.islands.flies(i)) {
         for (const std::uint32_t body : input.islands.bodies_of(i)) fly(input, body, states);
-      } else if (wants_newton(input.islands, i, layers)) {
-        IslandProblem problem = make_island_problem(input, i, start, options_, layers, place_);
-        by_newton[i] = solve_newton_step(problem, input, options_);
-        if (by_newton[i]) apply_solution(problem, input, states, impulses);
+        return;
       }
+      const Plan plan = plan_of(input, i, layers);
+      if (!plan.by_newton) return;
+      IslandProblem problem = make_island_problem(input, i, start, options_, layers, place_, plan.order);
+      bool turned_far = false;
+      by_newton[i] = solve_newton_step(problem, input, options_, JointRule::exact, &turned_far);
+      if (by_newton[i])
+        apply_solution(problem, input, states, impulses);
+      else if (turned_far)
+        by_newton[i] = solve_in_parts(input, i, plan, layers, states, impulses);
     });
     std::vector<std::uint32_t> soft;
     Residual all;
     for (std::uint32_t i = 0; i < input.islands.size(); ++i) {
       if (by_newton[i])
         all.add(*by_newton[i]);
-      else if (!input.islands.contacts_of(i).empty())
+      else if (!input.islands.flies(i))
         soft.push_back(i);
     }
     all.add(soft_.solve(input, soft, options_, states, impulses));
@@ -74,9 +107,38 @@ class IslandSolver final : public StepSolver {
   }
 
  private:
-  bool wants_newton(const Islands& islands, std::size_t island, std::span<const std::uint32_t> layers) const {
-    if (options_.kind == SolverKind::automatic) return is_slender(islands, island, layers);
-    return options_.kind == SolverKind::newton;
+  struct Plan {
+    bool by_newton;
+    std::vector<std::uint32_t> order;  // of bodies; empty: by layer
+  };
+
+  // A step in which joints turn far takes as many parts as that asks for.
+  std::optional<Residual> solve_in_parts(const StepInput& input, std::size_t island, const Plan& plan,
+                                         std::span<const std::uint32_t> layers, std::span<BodyState> states,
+                                         std::span<ContactImpulse> impulses) {
+    constexpr std::uint32_t kMostParts = 16;
+    std::optional<Residual> newton;
+    bool turned_far = true;
+    const auto solve = [&](std::uint32_t parts, JointRule rule) {
+      newton = solve_newton_parts(input, island, parts, options_, layers, place_, plan.order, rule, states,
+                                  impulses, &turned_far);
+    };
+    for (std::uint32_t parts = 2; turned_far && parts <= kMostParts; parts *= 2)
+      solve(parts, JointRule::exact);
+    if (turned_far) solve(kMostParts, JointRule::damped);
+    return newton;
+  }
+
+  Plan plan_of(const StepInput& input, std::size_t island, std::span<const std::uint32_t> layers) {
+    constexpr double kContactsOfJoint = 2;  // a joint has about twice the rows
+    const bool chooses = options_.kind == SolverKind::automatic;
+    if (options_.kind == SolverKind::soft) return {false, {}};
+    const auto joints = static_cast<double>(input.islands.joints_of(island).size());
+    if (joints == 0) return {!chooses || is_slender(input.islands, island, layers), {}};
+    const double contacts = static_cast<double>(input.islands.contacts_of(island).size());
+    const double most = kForAContact * (contacts + kContactsOfJoint * joints);
+    auto order = order_of_joined(input, island, chooses ? most : INFINITY, place_);
+    return {order.has_value(), order ? std::move(*order) : std::vector<std::uint32_t>()};
   }
 
   SolverOptions options_;
@@ -100,8 +162,7 @@ Material mixed_material(const BodyProperties& a, const BodyProperties& b, const 
 
 void StepSolver::sum_up(const Islands& islands, const Residual& residual) {
   statistics_ = {};
-  for (std::size_t i = 0; i < islands.size(); ++i)
-    statistics_.islands += islands.contacts_of(i).empty() ? 0 : 1;
+  for (std::size_t i = 0; i < islands.size(); ++i) statistics_.islands += islands.flies(i) ? 0 : 1;
   statistics_.contacts = islands.contacts.size();
   if (statistics_.contacts == 0) return;
   statistics_.residual = residual.largest;

@@ -5,6 +5,7 @@
 #include <span>
 
 #include "dynamics/islands.h"
+#include "dynamics/joint.h"
 #include "dynamics/threads.h"
 
 namespace tandem::dynamics {
@@ -37,12 +38,14 @@ Material mixed_material(const BodyProperties& a, const BodyProperties& b, const 
 struct StepInput {
   std::span<const BodyProperties> bodies;
   std::span<const ContactPoint> contacts;
-  const Islands& islands;  ///< of these contacts
+  const Islands& islands;  ///< of these contacts and joints
   double dt;
   std::span<const Pull> pulls;  ///< of each body
   std::uint64_t number;         ///< of the step
   bool is_cold;                 ///< there are no impulses of a step before
   Threads& threads;
+  std::span<const Joint> joints = {};
+  std::span<JointMemory> joint_memory = {};  ///< impulses of the step before, and then of this one
 
   /// Returns what is added to the velocity of any point of a body in a second, at most; 0 of a body that
   /// contacts do not move.

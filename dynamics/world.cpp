@@ -32,16 +32,18 @@ struct World::Parts {
   std::vector<BodyMotion> bodies;
   std::vector<WorldContact> contacts;
   std::vector<ObjectPair> began, ended;  // in the last call
+  std::vector<WorldJoint> joints;
   double time = 0;
   std::uint64_t where = 0;
 
   void clear() {
     simulation.reset(), placed.reset();
-    bodies.clear(), contacts.clear(), began.clear(), ended.clear();
+    bodies.clear(), contacts.clear(), began.clear(), ended.clear(), joints.clear();
     time = 0, where = 0;
   }
   void read();
   void read_contacts();
+  void read_joints(double dt);
 };
 
 namespace {
@@ -115,6 +117,17 @@ class Masses {
   std::vector<std::optional<BodyProperties>> of_;
 };
 
+Status check(const JointDescription& joint, std::span<const BodyProperties> bodies) {
+  bool moves = false;
+  for (const std::uint32_t body : {joint.a, joint.b}) {
+    if (body == kNoIndex) continue;
+    if (body >= bodies.size()) return Status::kUnknownInstance;
+    moves = moves || bodies[body].motion == Motion::moving;
+  }
+  if (!moves || joint.a == joint.b) return Status::kJoinsNothing;
+  return dynamics::check(joint);
+}
+
 }  // namespace
 
 World::World() : parts_(new (std::nothrow) Parts) {}
@@ -143,7 +156,7 @@ Status World::set_assets(std::span<const AssetView> assets) {
 }
 
 Status World::set_bodies(std::span<const BodyDescription> bodies, const WorldOptions& options,
-                         std::span<const ObjectPair> excluded) {
+                         std::span<const ObjectPair> excluded, std::span<const JointDescription> joints) {
   if (parts_ == nullptr) return Status::kOutOfMemory;
   Parts& parts = *parts_;
   parts.clear();
@@ -168,7 +181,16 @@ Status World::set_bodies(std::span<const BodyDescription> bodies, const WorldOpt
       if (!is_usable_start(from, states[i])) return fail(Status::kOutOfRange, i);
       parts.group.push_back(from.filter.group), parts.mask.push_back(from.filter.mask);
     }
-    const Status excludes = parts.excluded.set(excluded);
+    std::vector<ObjectPair> apart(excluded.begin(), excluded.end());
+    std::vector<Joint> joined;
+    for (std::size_t i = 0; i < joints.size(); ++i) {
+      const JointDescription& from = joints[i];
+      const Status status = check(from, all);
+      if (status != Status::kOk) return fail(status, i);
+      joined.push_back(make_joint(from, states));
+      if (!from.may_touch && from.a != kNoIndex && from.b != kNoIndex) apart.push_back({from.a, from.b});
+    }
+    const Status excludes = parts.excluded.set(apart);
     if (excludes != Status::kOk) return fail(excludes);
     const PairFilter filter = {nullptr, parts.group.data(), parts.mask.data(), parts.excluded.view()};
     SimulationOptions to;
@@ -186,9 +208,12 @@ Status World::set_bodies(std::span<const BodyDescription> bodies, const WorldOpt
     of.ahead = std::make_unique<ContactsAhead>(parts.assets, options.threads, filter);
     if (options.continuous)
       of.continuous = std::make_unique<ContinuousMotion>(parts.assets, options.threads, filter);
+    of.joints = std::move(joined);
     parts.simulation = std::make_unique<Simulation>(std::move(all), std::move(states), std::move(of), to);
     parts.placed = std::make_shared<char>();
+    parts.joints.resize(joints.size());
     parts.read();
+    parts.read_joints(1);
   } catch (const std::bad_alloc&) {
     parts.clear();
     return fail(Status::kOutOfMemory);
@@ -226,6 +251,29 @@ void World::Parts::read_contacts() {
   }
 }
 
+void World::Parts::read_joints(double dt) {
+  for (std::size_t i = 0; i < joints.size(); ++i) {
+    const Joint& joint = simulation->joints()[i];
+    const JointMemory& memory = simulation->joint_memory()[i];
+    const auto states = simulation->states();
+    const BodyState a = state_of(joint.a, states), b = state_of(joint.b, states);
+    const JointGeometry geometry = geometry_of(joint, a, b, memory.position);
+    const JointDirections directions = directions_of(joint, geometry);
+    Vector3 impulse, turning;
+    double effort = 0;
+    for (std::size_t k = 0; k < directions.count; ++k) {
+      const JointDirection& row = directions.row[k];
+      const double push = memory.impulse[row.slot];
+      impulse += push * row.linear;
+      turning += push * (row.angular_b - cross(geometry.arm_b, row.linear));
+      if (row.kind == JointRowKind::motor) effort = push / dt;
+    }
+    joints[i] = {memory.position, free_speed(joint, geometry, a, b), {}, {}, effort};
+    write(impulse, joints[i].impulse);
+    write(turning, joints[i].turning);
+  }
+}
+
 Status World::step(double dt, std::uint32_t steps) {
   if (parts_ == nullptr) return Status::kOutOfMemory;
   if (!(dt > 0 && dt <= 1000)) return fail(Status::kBadDuration);
@@ -260,6 +308,7 @@ Status World::step(double dt, std::uint32_t steps) {
     }
     parts.read();
     parts.read_contacts();
+    parts.read_joints(dt);
   } catch (const std::bad_alloc&) {
     return fail(Status::kOutOfMemory);
   } catch (const QueryFailed& failed) {
@@ -288,6 +337,22 @@ std::span<const ObjectPair> World::began() const {
 
 std::span<const ObjectPair> World::ended() const {
   return parts_ != nullptr ? std::span<const ObjectPair>(parts_->ended) : std::span<const ObjectPair>();
+}
+
+std::span<const WorldJoint> World::joints() const {
+  return parts_ != nullptr ? std::span<const WorldJoint>(parts_->joints) : std::span<const WorldJoint>();
+}
+
+Status World::set_motor(std::uint32_t joint, double speed, double most_effort) {
+  if (joint >= joints().size()) return fail(Status::kBadJoint, joint);
+  JointDescription motor;
+  motor.kind = parts_->simulation->joints()[joint].kind;
+  motor.speed = speed, motor.most_effort = most_effort;
+  const Status status = dynamics::check(motor);
+  if (status != Status::kOk) return fail(status, joint);
+  parts_->simulation->set_motor(joint, speed, most_effort);
+  parts_->read();
+  return fail(Status::kOk);
 }
 
 double World::time() const {
@@ -363,6 +428,7 @@ Status World::restore(const State& state) {
     parts_->time = state.time;
     parts_->contacts.clear(), parts_->began.clear(), parts_->ended.clear();
     parts_->read();
+    parts_->read_joints(1);
   } catch (const std::bad_alloc&) {
     return fail(Status::kOutOfMemory);
   } catch (const QueryFailed& failed) {

@@ -277,6 +277,38 @@ static void test_bad_bodies(void) {
   tandem_world_destroy(world);
 }
 
+// A box that a motor turns about a hinge through its middle.
+static void test_joints(void) {
+  size_t count = 7;
+  const tandem_world_options options = {.struct_size = sizeof options, .no_gravity = 1};
+  tandem_world* world = world_of(&options);
+  const tandem_instance bodies[] = {at(0, 0, 0), at(3, 0, 0)};
+  tandem_joint joint = {.kind = TANDEM_HINGE, .a = TANDEM_NO_INDEX, .axis = {0, 0, 2}, .speed = 2, .most_effort = 1e6};
+  tandem_body_start start = {.struct_size = sizeof start, .joints = &joint, .joint_count = 1};
+  CHECK_STATUS(tandem_world_set_bodies(world, bodies, 2, NULL, &start), TANDEM_OK);
+  CHECK_STATUS(tandem_world_step(world, 0.01, 100), TANDEM_OK);
+  const tandem_world_joint* joints = tandem_world_joints(world, &count);
+  CHECK(count == 1 && fabs(joints[0].speed - 2) < 1e-6 && fabs(joints[0].position - 2) < 0.02);
+  CHECK(fabs(tandem_world_bodies(world, NULL)[0].angular_velocity[2] - 2) < 1e-6);
+  CHECK_STATUS(tandem_world_set_motor(world, 0, 0, 1e6), TANDEM_OK);
+  CHECK_STATUS(tandem_world_step(world, 0.01, 1), TANDEM_OK);
+  CHECK(fabs(tandem_world_joints(world, NULL)[0].speed) < 1e-9);
+  CHECK_STATUS(tandem_world_set_motor(world, 1, 0, 0), TANDEM_BAD_JOINT);
+  CHECK(tandem_world_where(world) == 1);
+  joint.most = 1;  // without the flag that limits count
+  CHECK_STATUS(tandem_world_set_bodies(world, bodies, 2, NULL, &start), TANDEM_BAD_JOINT);
+  joint.has_limits = 1;
+  CHECK_STATUS(tandem_world_set_bodies(world, bodies, 2, NULL, &start), TANDEM_OK);
+  joint.axis[2] = 0;
+  CHECK_STATUS(tandem_world_set_bodies(world, bodies, 2, NULL, &start), TANDEM_NO_AXIS);
+  joint.b = TANDEM_NO_INDEX;
+  CHECK_STATUS(tandem_world_set_bodies(world, bodies, 2, NULL, &start), TANDEM_JOINS_NOTHING);
+  CHECK(tandem_world_joints(world, &count) == NULL && count == 0 && tandem_world_joints(NULL, NULL) == NULL);
+  start.joints = NULL;
+  CHECK_STATUS(tandem_world_set_bodies(world, bodies, 2, NULL, &start), TANDEM_NULL_ARGUMENT);
+  tandem_world_destroy(world);
+}
+
 static void test_bad_calls(void) {
   size_t count = 7;
   const double numbers[] = {0, 0, NAN};
@@ -373,6 +405,7 @@ int main(int argc, char** argv) {
   test_state();
   test_bad_options();
   test_bad_bodies();
+  test_joints();
   test_bad_calls();
   test_threads(cow);
   tandem_asset_release(cow);

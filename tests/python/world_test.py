@@ -167,6 +167,25 @@ def test_what_touches_is_told():
     assert len(world.touching) == len(world.began) == len(world.ended) == 0
 
 
+def test_joints_hold_and_motors_turn():
+    joints = [tandem.Joint("fixed", None, 0, anchor=[0, 0, 0]),
+              tandem.Joint("hinge", 0, 1, anchor=[0.2, 0.1, 1.0], axis=[0, 0, 3], limits=(-1, 7), speed=2, most_effort=1e6)]
+    world = tandem.World([BOX], translation=[[0, 0, 0], [0.2, 0.1, 1.0]], joints=joints)
+    world.step(1 / 60, 60)
+    assert len(world.contacts) == 0
+    assert np.allclose(world.translation, [[0, 0, 0], [0.2, 0.1, 1]], atol=1e-6)
+    assert np.allclose(world.joints["position"], [0, 2], atol=0.02) and np.allclose(world.joints["speed"], [0, 2])
+    world.set_motor(1, -3, 1e6)
+    world.step(1 / 60, 2)
+    assert np.allclose(world.angular_velocity[1], [0, 0, -3])
+    with pytest.raises(tandem.Error, match="no such joint"):
+        world.set_motor(0, 1, 1)
+    with pytest.raises(tandem.Error, match="axis"):
+        world.place(translation=[0, 0, 0], joints=[tandem.Joint("slider", 0, None, anchor=[0, 0, 0], axis=[0, 0, 0])])
+    with pytest.raises(ValueError, match="kind is 'rope'"):
+        world.place(translation=[0, 0, 0], joints=[tandem.Joint("rope", 0, None, anchor=[0, 0, 0])])
+
+
 def test_filters_and_no_bodies():
     world = tandem.World([BOX], translation=[[0, 0, 0], [0, 0, 1]], filter=tandem.Filter(motion=[tandem.FIXED, tandem.SLEEPING], excluded=[[1, 0]]))
     world.step(1 / 60, 30)

@@ -453,6 +453,23 @@ public unsafe struct tandem_world_options {
 }
 
 [StructLayout(LayoutKind.Sequential)]
+public unsafe struct tandem_joint {
+  public uint kind;
+  public uint a;
+  public uint b;
+  public byte has_limits;
+  public byte may_touch;
+  public fixed byte reserved[2];
+  public fixed double anchor[3];
+  public fixed double anchor_b[3];
+  public fixed double axis[3];
+  public double least;
+  public double most;
+  public double speed;
+  public double most_effort;
+}
+
+[StructLayout(LayoutKind.Sequential)]
 public unsafe struct tandem_body_start {
   public uint struct_size;
   public uint reserved;
@@ -464,6 +481,8 @@ public unsafe struct tandem_body_start {
   public double* restitution;
   public double* rolling_resistance;
   public double* gravity_scale;
+  public tandem_joint* joints;
+  public UIntPtr joint_count;
 }
 
 [StructLayout(LayoutKind.Sequential)]
@@ -484,6 +503,15 @@ public unsafe struct tandem_world_contact {
   public fixed double normal[3];
   public double depth;
   public fixed double impulse[3];
+}
+
+[StructLayout(LayoutKind.Sequential)]
+public unsafe struct tandem_world_joint {
+  public double position;
+  public double speed;
+  public fixed double impulse[3];
+  public fixed double turning[3];
+  public double motor_effort;
 }
 
 public static unsafe class Native {
@@ -574,6 +602,9 @@ public static unsafe class Native {
   public const uint TANDEM_BAD_TOLERANCE = 214;
   public const uint TANDEM_BAD_DURATION = 215;
   public const uint TANDEM_NO_MASS = 216;
+  public const uint TANDEM_BAD_JOINT = 217;
+  public const uint TANDEM_NO_AXIS = 218;
+  public const uint TANDEM_JOINS_NOTHING = 219;
   public const uint TANDEM_NO_GPU = 300;
   public const uint TANDEM_DRIVER_TOO_OLD = 301;
   public const uint TANDEM_GPU_NOT_SUPPORTED = 302;
@@ -611,6 +642,11 @@ public static unsafe class Native {
   public const uint TANDEM_APART = 0;
   public const uint TANDEM_TOUCH = 1;
   public const uint TANDEM_WITHIN_TOLERANCE = 2;
+  public const uint TANDEM_BALL = 0;
+  public const uint TANDEM_HINGE = 1;
+  public const uint TANDEM_SLIDER = 2;
+  public const uint TANDEM_FIXED_JOINT = 3;
+  public const uint TANDEM_DISTANCE = 4;
   public const uint TANDEM_VERSION_MAJOR = 0;
   public const uint TANDEM_VERSION_MINOR = 1;
   public const uint TANDEM_VERSION_PATCH = 0;
@@ -678,6 +714,8 @@ public static unsafe class Native {
   [DllImport("tandem")] public static extern tandem_object_pair* tandem_world_touching(IntPtr world, UIntPtr* count);
   [DllImport("tandem")] public static extern tandem_object_pair* tandem_world_began(IntPtr world, UIntPtr* count);
   [DllImport("tandem")] public static extern tandem_object_pair* tandem_world_ended(IntPtr world, UIntPtr* count);
+  [DllImport("tandem")] public static extern tandem_world_joint* tandem_world_joints(IntPtr world, UIntPtr* count);
+  [DllImport("tandem")] public static extern uint tandem_world_set_motor(IntPtr world, uint joint, double speed, double most_effort);
   [DllImport("tandem")] public static extern double tandem_world_time(IntPtr world);
   [DllImport("tandem")] public static extern double tandem_world_mass(IntPtr world, uint body);
   [DllImport("tandem")] public static extern uint tandem_world_set_body(IntPtr world, uint body, tandem_body_motion* motion);

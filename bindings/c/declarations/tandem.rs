@@ -90,6 +90,9 @@ pub const TANDEM_BAD_REACH: u32 = 213;
 pub const TANDEM_BAD_TOLERANCE: u32 = 214;
 pub const TANDEM_BAD_DURATION: u32 = 215;
 pub const TANDEM_NO_MASS: u32 = 216;
+pub const TANDEM_BAD_JOINT: u32 = 217;
+pub const TANDEM_NO_AXIS: u32 = 218;
+pub const TANDEM_JOINS_NOTHING: u32 = 219;
 pub const TANDEM_NO_GPU: u32 = 300;
 pub const TANDEM_DRIVER_TOO_OLD: u32 = 301;
 pub const TANDEM_GPU_NOT_SUPPORTED: u32 = 302;
@@ -127,6 +130,11 @@ pub const TANDEM_IMPACT_AT_START: u32 = 2;
 pub const TANDEM_APART: u32 = 0;
 pub const TANDEM_TOUCH: u32 = 1;
 pub const TANDEM_WITHIN_TOLERANCE: u32 = 2;
+pub const TANDEM_BALL: u32 = 0;
+pub const TANDEM_HINGE: u32 = 1;
+pub const TANDEM_SLIDER: u32 = 2;
+pub const TANDEM_FIXED_JOINT: u32 = 3;
+pub const TANDEM_DISTANCE: u32 = 4;
 pub const TANDEM_VERSION_MAJOR: u32 = 0;
 pub const TANDEM_VERSION_MINOR: u32 = 1;
 pub const TANDEM_VERSION_PATCH: u32 = 0;
@@ -655,6 +663,24 @@ pub struct tandem_world_options {
 
 #[repr(C)]
 #[derive(Clone, Copy)]
+pub struct tandem_joint {
+    pub kind: u32,
+    pub a: u32,
+    pub b: u32,
+    pub has_limits: u8,
+    pub may_touch: u8,
+    pub reserved: [u8; 2],
+    pub anchor: [f64; 3],
+    pub anchor_b: [f64; 3],
+    pub axis: [f64; 3],
+    pub least: f64,
+    pub most: f64,
+    pub speed: f64,
+    pub most_effort: f64,
+}
+
+#[repr(C)]
+#[derive(Clone, Copy)]
 pub struct tandem_body_start {
     pub struct_size: u32,
     pub reserved: u32,
@@ -666,6 +692,8 @@ pub struct tandem_body_start {
     pub restitution: *const f64,
     pub rolling_resistance: *const f64,
     pub gravity_scale: *const f64,
+    pub joints: *const tandem_joint,
+    pub joint_count: usize,
 }
 
 #[repr(C)]
@@ -688,6 +716,16 @@ pub struct tandem_world_contact {
     pub normal: [f64; 3],
     pub depth: f64,
     pub impulse: [f64; 3],
+}
+
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct tandem_world_joint {
+    pub position: f64,
+    pub speed: f64,
+    pub impulse: [f64; 3],
+    pub turning: [f64; 3],
+    pub motor_effort: f64,
 }
 
 #[link(name = "tandem")]
@@ -755,6 +793,8 @@ extern "C" {
     pub fn tandem_world_touching(world: *const tandem_world, count: *mut usize) -> *const tandem_object_pair;
     pub fn tandem_world_began(world: *const tandem_world, count: *mut usize) -> *const tandem_object_pair;
     pub fn tandem_world_ended(world: *const tandem_world, count: *mut usize) -> *const tandem_object_pair;
+    pub fn tandem_world_joints(world: *const tandem_world, count: *mut usize) -> *const tandem_world_joint;
+    pub fn tandem_world_set_motor(world: *mut tandem_world, joint: u32, speed: f64, most_effort: f64) -> tandem_status;
     pub fn tandem_world_time(world: *const tandem_world) -> f64;
     pub fn tandem_world_mass(world: *const tandem_world, body: u32) -> f64;
     pub fn tandem_world_set_body(world: *mut tandem_world, body: u32, motion: *const tandem_body_motion) -> tandem_status;

@@ -24,6 +24,9 @@ static_assert(TANDEM_NO_INDEX == kNoIndex && TANDEM_OK == uint32_t(Status::kOk))
 static_assert(sizeof(Motion) == sizeof(uint8_t));
 static_assert(TANDEM_MOVING == int(Motion::moving) && TANDEM_FIXED == int(Motion::fixed) &&
               TANDEM_KINEMATIC == int(Motion::kinematic) && TANDEM_SLEEPING == int(Motion::sleeping));
+static_assert(TANDEM_BALL == int(JointKind::ball) && TANDEM_HINGE == int(JointKind::hinge) &&
+              TANDEM_SLIDER == int(JointKind::slider) && TANDEM_FIXED_JOINT == int(JointKind::fixed) &&
+              TANDEM_DISTANCE == int(JointKind::distance));
 static_assert(TANDEM_EXACT == int(QueryMode::exact) && TANDEM_FAST == int(QueryMode::fast) &&
               TANDEM_BOXES == int(QueryMode::boxes));
 static_assert(TANDEM_TOUCHING == int(kTouching) && TANDEM_OPEN_CURVE == int(kOpenCurve) &&

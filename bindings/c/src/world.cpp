@@ -117,6 +117,31 @@ tandem_status read_excluded(const tandem_excluded_pairs* given, size_t bodies, s
   return TANDEM_OK;
 }
 
+// Result: TANDEM_OK, TANDEM_NULL_ARGUMENT or, where `where` is the joint, TANDEM_BAD_JOINT.
+tandem_status read_joints(const tandem_body_start& given, std::vector<JointDescription>& joints,
+                          uint64_t& where) {
+  if (!is_there(given.joints, given.joint_count)) return TANDEM_NULL_ARGUMENT;
+  for (size_t i = 0; i < given.joint_count; ++i) {
+    const tandem_joint& from = given.joints[i];
+    const bool is_limited = from.has_limits != 0 || from.least != 0 || from.most != 0;
+    if (from.kind > TANDEM_DISTANCE || from.has_limits > 1 || from.may_touch > 1 ||
+        (is_limited && from.has_limits == 0) || from.reserved[0] != 0 || from.reserved[1] != 0) {
+      where = i;
+      return TANDEM_BAD_JOINT;
+    }
+    JointDescription& joint = joints.emplace_back();
+    joint.kind = static_cast<JointKind>(from.kind);
+    joint.a = from.a, joint.b = from.b;
+    std::ranges::copy(from.anchor, joint.anchor);
+    std::ranges::copy(from.anchor_b, joint.anchor_b);
+    std::ranges::copy(from.axis, joint.axis);
+    if (from.has_limits != 0) joint.least = from.least, joint.most = from.most;
+    joint.speed = from.speed, joint.most_effort = from.most_effort;
+    joint.may_touch = from.may_touch != 0;
+  }
+  return TANDEM_OK;
+}
+
 tandem_status set_bodies(tandem_world& self, const tandem_instance* instances, size_t count,
                          const tandem_pair_filter* filter, const tandem_body_start* start) {
   if (!is_there(instances, count)) return TANDEM_NULL_ARGUMENT;
@@ -126,6 +151,8 @@ tandem_status set_bodies(tandem_world& self, const tandem_instance* instances, s
   tandem_status status = read_filter(filter, count, read, self.where);
   if (status == TANDEM_OK) status = read_start(start, count, starts);
   if (status == TANDEM_OK) status = read_excluded(read.excluded, count, excluded, self.where);
+  std::vector<JointDescription> joints;
+  if (status == TANDEM_OK) status = read_joints(starts, joints, self.where);
   if (status != TANDEM_OK) return status;
   std::vector<BodyDescription> bodies(count);
   for (size_t i = 0; i < count; ++i) {
@@ -145,7 +172,7 @@ tandem_status set_bodies(tandem_world& self, const tandem_instance* instances, s
     if (starts.angular_velocity != nullptr)
       std::copy_n(starts.angular_velocity + 3 * i, 3, body.angular_velocity);
   }
-  const Status placed = self.world.set_bodies(bodies, self.options, excluded);
+  const Status placed = self.world.set_bodies(bodies, self.options, excluded, joints);
   if (placed != Status::kNoTopology) return self.told(placed);
   return self.fail(to_c(placed), bodies[self.world.where()].asset);
 }
@@ -203,6 +230,16 @@ const tandem_object_pair* tandem_world_began(const tandem_world* world, size_t* 
 
 const tandem_object_pair* tandem_world_ended(const tandem_world* world, size_t* count) {
   return rows_of<tandem_object_pair>(world, &World::ended, count);
+}
+
+const tandem_world_joint* tandem_world_joints(const tandem_world* world, size_t* count) {
+  return result<tandem_world_joint>(world != nullptr ? world->world.joints() : std::span<const WorldJoint>(),
+                                    count);
+}
+
+tandem_status tandem_world_set_motor(tandem_world* world, uint32_t joint, double speed, double most_effort) {
+  return enter(
+      world, [&](tandem_world& self) { return self.told(self.world.set_motor(joint, speed, most_effort)); });
 }
 
 double tandem_world_time(const tandem_world* world) {

@@ -67,7 +67,7 @@ class World {
 
   void set_bodies(nb::handle instances, const Filter* filter, nb::handle density, nb::handle velocity,
                   nb::handle angular_velocity, nb::handle friction, nb::handle restitution,
-                  nb::handle rolling_resistance, nb::handle gravity_scale) {
+                  nb::handle rolling_resistance, nb::handle gravity_scale, nb::handle joints) {
     const Turn turn = take_turn();
     const auto rows = copy_rows<tandem_instance>(instances);
     auto start = sized<tandem_body_start>();
@@ -85,6 +85,8 @@ class World {
     take(rolling_resistance, 1, start.rolling_resistance);
     take(gravity_scale, 1, start.gravity_scale);
     began_.clear(), ended_.clear();
+    const auto joined = copy_rows<tandem_joint>(joints);
+    start.joints = joined.data(), start.joint_count = joined.size();
     ask([&](tandem_world* world) {
       return tandem_world_set_bodies(world, rows.data(), rows.size(), Filter::of(filter), &start);
     });
@@ -131,6 +133,13 @@ class World {
   nb::object touching() { return rows<tandem_world_touching>(); }
   nb::object began() { return copy_of(began_); }
   nb::object ended() { return copy_of(ended_); }
+
+  nb::object joints() { return rows<tandem_world_joints>(); }
+
+  void set_motor(std::uint32_t joint, double speed, double most_effort) {
+    const Turn turn = take_turn();
+    ask([&](tandem_world* world) { return tandem_world_set_motor(world, joint, speed, most_effort); });
+  }
 
   std::size_t count() {
     const Turn turn = take_turn();
@@ -225,7 +234,7 @@ void add_worlds(nb::module_& module) {
            nb::arg(), nb::arg(), nb::arg(), nb::arg(), none(), none(), nb::arg(), nb::arg(), nb::arg(),
            nb::arg())
       .def("set_bodies", &World::set_bodies, nb::arg(), none(), none(), none(), none(), none(), none(),
-           none(), none())
+           none(), none(), nb::arg())
       .def("step", &World::step)
       .def("set_body", &World::set_body)
       .def("push", &World::with_two<tandem_world_push>)
@@ -235,6 +244,8 @@ void add_worlds(nb::module_& module) {
       .def("touching", &World::touching)
       .def("began", &World::began)
       .def("ended", &World::ended)
+      .def("joints", &World::joints)
+      .def("set_motor", &World::set_motor)
       .def("count", &World::count)
       .def("time", &World::time)
       .def("masses", &World::masses)

@@ -1,7 +1,8 @@
 """Worlds: rigid bodies that move under gravity and contacts."""
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,13 +13,64 @@ from ._arrays import Rotations, Rows, amount, flag, floats, instances_of, number
 from ._asset import Asset
 from ._errors import Error
 from ._poses import explained
-from ._rows import BODY_MOTION, INSTANCE, PAIR, WORLD_CONTACT
+from ._rows import BODY_MOTION, INSTANCE, JOINT, NO_INDEX, PAIR, WORLD_CONTACT, WORLD_JOINT
 from ._scene import Filter, _core_of, cores_of
 
-__all__ = ["World", "WorldState"]
+__all__ = ["Joint", "World", "WorldState"]
 
 _MOST = 1e6  # of options that are numbers
 _Numbers = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Joint:
+    """Two bodies, of which at least one moves, joined as they are placed. Anchors and axis are those of the world at that time, and the bodies carry them along.
+
+    Args:
+        kind: "ball" turns about the anchor; "hinge" about an axis through it, by an angle; "slider" moves along the axis, by a way; "fixed" not at all; "distance"
+            keeps how far the two anchors are apart, such as a rod or a rope.
+        a, b: bodies; None: the world.
+        anchor: (3,), where they are joined; of a distance, the point of a.
+        anchor_b: (3,), of a distance alone: the point of b.
+        axis: (3,), of a hinge or slider, of any length.
+        limits: least and most of the angle or way, which is 0 as the bodies are placed, or of the distance, which without limits stays what it is; may be
+            infinite.
+        speed: that the motor of a hinge or slider drives b at, against a.
+        most_effort: its greatest torque or force; 0: there is no motor.
+        may_touch: the two bodies have contacts with each other.
+    """
+
+    kind: str
+    a: int | None
+    b: int | None
+    anchor: npt.ArrayLike
+    anchor_b: npt.ArrayLike = (0.0, 0.0, 0.0)
+    axis: npt.ArrayLike = (0.0, 0.0, 1.0)
+    limits: tuple[float, float] | None = None
+    speed: float = 0.0
+    most_effort: float = 0.0
+    may_touch: bool = False
+
+
+_KINDS = ("ball", "hinge", "slider", "fixed", "distance")
+
+
+def _joint_rows(joints: Sequence[Joint]) -> Rows:
+    rows = np.zeros(len(joints), JOINT)
+    for row, joint in zip(rows, joints):
+        if joint.kind not in _KINDS:
+            raise ValueError(f"kind is {joint.kind!r} where one of {', '.join(_KINDS)} is wanted")
+        row["kind"] = _KINDS.index(joint.kind)
+        for name, body in (("a", joint.a), ("b", joint.b)):
+            row[name] = NO_INDEX if body is None else whole_number(body, name, 0, NO_INDEX - 1)
+        row["anchor"], row["anchor_b"] = _vector(joint.anchor, "anchor"), _vector(joint.anchor_b, "anchor_b")
+        row["axis"] = _vector(joint.axis, "axis")
+        if joint.limits is not None:
+            row["has_limits"] = 1
+            row["least"], row["most"] = joint.limits
+        row["speed"], row["most_effort"] = number(joint.speed, "speed"), number(joint.most_effort, "most_effort")
+        row["may_touch"] = flag(joint.may_touch, "may_touch")
+    return rows
 
 
 class WorldState:
@@ -74,7 +126,7 @@ class World:
 
     Args:
         assets: that bodies refer to by their place in this list. The world keeps them.
-        instances, filter, asset, rotation, translation, transform, density, velocity, angular_velocity, gravity_scale: bodies, as of `place`; none where
+        instances, filter, asset, rotation, translation, transform, density, velocity, angular_velocity, gravity_scale, joints: bodies, as of `place`; none where
             none of the poses is given.
         gravity: (3,).
         friction: Coulomb's coefficient; (n,): of each body, as of `place`, and that of the world is 0.5.
@@ -101,8 +153,9 @@ class World:
     def __init__(self, assets: Iterable[Asset], instances: Rows | None = None, *, filter: Filter | None = None, asset: npt.ArrayLike | None = None,
                  rotation: Rotations | None = None, translation: npt.ArrayLike | None = None, transform: npt.ArrayLike | None = None,
                  density: npt.ArrayLike = 1000.0, velocity: npt.ArrayLike | None = None, angular_velocity: npt.ArrayLike | None = None,
-                 gravity_scale: npt.ArrayLike = 1.0, gravity: npt.ArrayLike = (0.0, 0.0, -9.81), friction: npt.ArrayLike = 0.5, restitution: npt.ArrayLike = 0.0,
-                 slop: float | None = None, rolling_resistance: npt.ArrayLike | None = None, substeps: int = 16, sleeping: bool = True, continuous: bool = False, threads: int = 1):
+                 gravity_scale: npt.ArrayLike = 1.0, joints: Sequence[Joint] = (), gravity: npt.ArrayLike = (0.0, 0.0, -9.81), friction: npt.ArrayLike = 0.5,
+                 restitution: npt.ArrayLike = 0.0, slop: float | None = None, rolling_resistance: npt.ArrayLike | None = None, substeps: int = 16,
+                 sleeping: bool = True, continuous: bool = False, threads: int = 1):
         world_friction, frictions = _of_world(friction, "friction", _MOST, 0.5)
         world_restitution, restitutions = _of_world(restitution, "restitution", 1.0, 0.0)
         world_lever, levers = _of_world(rolling_resistance, "rolling_resistance", _MOST, None)
@@ -112,14 +165,15 @@ class World:
         self._asset = np.zeros(0, np.uint32)
         if not (instances is None and asset is None and rotation is None and translation is None and transform is None):
             self.place(instances, filter=filter, asset=asset, rotation=rotation, translation=translation, transform=transform, density=density, velocity=velocity,
-                       angular_velocity=angular_velocity, friction=frictions, restitution=restitutions, rolling_resistance=levers, gravity_scale=gravity_scale)
-        elif any(given is not None for given in (filter, velocity, angular_velocity, frictions, restitutions, levers)):
+                       angular_velocity=angular_velocity, friction=frictions, restitution=restitutions, rolling_resistance=levers, gravity_scale=gravity_scale, joints=joints)
+        elif any(given is not None for given in (filter, velocity, angular_velocity, frictions, restitutions, levers)) or joints:
             raise TypeError("instances is missing, or asset, rotation, translation or transform")
 
     def place(self, instances: Rows | None = None, *, filter: Filter | None = None, asset: npt.ArrayLike | None = None, rotation: Rotations | None = None,
               translation: npt.ArrayLike | None = None, transform: npt.ArrayLike | None = None, density: npt.ArrayLike = 1000.0,
               velocity: npt.ArrayLike | None = None, angular_velocity: npt.ArrayLike | None = None, friction: npt.ArrayLike | None = None,
-              restitution: npt.ArrayLike | None = None, rolling_resistance: npt.ArrayLike | None = None, gravity_scale: npt.ArrayLike = 1.0) -> World:
+              restitution: npt.ArrayLike | None = None, rolling_resistance: npt.ArrayLike | None = None, gravity_scale: npt.ArrayLike = 1.0,
+              joints: Sequence[Joint] = ()) -> World:
         """Places all bodies anew, at time 0. Returns the world.
 
         Args:
@@ -131,19 +185,21 @@ class World:
             friction, restitution, rolling_resistance: () or (n,); None, or less than 0: as of the world. Two bodies that touch have the geometric mean of their
                 frictions, the larger restitution and the larger rolling resistance.
             gravity_scale: () or (n,), the part of gravity that acts on a body; 0: it floats.
+            joints: between these bodies, and with the world.
 
         Raises:
-            Error: as of `Scene.place`; a velocity or gravity_scale that is not finite; a moving body whose mesh has no topology or no extent, or whose density is not positive. There
-                are no bodies then.
+            Error: as of `Scene.place`; a velocity or gravity_scale that is not finite; a moving body whose mesh has no topology or no extent, or whose density is not positive; a
+                joint of a body that there is not, of two that nothing moves, without an axis, or with numbers that its kind cannot have. There are no bodies then.
         """
         bodies = instances_of(instances, asset, rotation, translation, transform)
         given = (_of_each(density, "density", len(bodies)), _of_each(velocity, "velocity", len(bodies), 3),
                  _of_each(angular_velocity, "angular_velocity", len(bodies), 3), _material(friction, "friction", len(bodies)),
                  _material(restitution, "restitution", len(bodies), 1.0), _material(rolling_resistance, "rolling_resistance", len(bodies)),
                  _of_each(gravity_scale, "gravity_scale", len(bodies)))
+        joined = _joint_rows(joints)
         self._asset = np.zeros(0, np.uint32)
         try:
-            self._core.set_bodies(bodies, _core_of(filter), *given)
+            self._core.set_bodies(bodies, _core_of(filter), *given, joined)
         except Error as error:
             raise explained(error, bodies) from None
         self._asset = bodies["asset"].copy()
@@ -217,6 +273,11 @@ class World:
         [[0.0, 0.0, 5.0]]
         """
         self._core.set_force(self._body(body), _vector(force, "force"), _vector(torque, "torque"))
+
+    def set_motor(self, joint: int, speed: float, most_effort: float) -> None:
+        """Gives the motor of a hinge or slider another speed and greatest torque or force, and wakes the bodies. Error, where `where` is the joint: there is none
+        such, or it has no motor."""
+        self._core.set_motor(whole_number(joint, "joint", 0, NO_INDEX), number(speed, "speed"), number(most_effort, "most_effort"))
 
     def save(self) -> WorldState:
         """Keeps all that the next steps depend on."""
@@ -324,6 +385,18 @@ class World:
     def ended(self) -> Rows:
         """The pairs that came to touch no longer, as `began`."""
         return np.frombuffer(self._core.ended(), PAIR)
+
+    @property
+    def joints(self) -> Rows:
+        """What the joints did in the last step, a copy, array of WORLD_JOINT in the order they were given: angle, way or distance, its speed, and impulses.
+
+        >>> rod = tandem.Joint("ball", None, 0, anchor=[0, 0, 5])
+        >>> world = tandem.World([box], translation=[[0, 0, 4]], joints=[rod])
+        >>> world.step(1 / 60)
+        >>> (world.joints["impulse"][0] * 60 / world.mass[0]).round(2).tolist()
+        [0.0, 0.0, 9.81]
+        """
+        return np.frombuffer(self._core.joints(), WORLD_JOINT)
 
     @property
     def time(self) -> float:

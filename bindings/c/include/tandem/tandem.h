@@ -93,6 +93,7 @@ enum {
   TANDEM_TOO_MANY_PAIRS = 206, TANDEM_KEPT_MISMATCH = 207, TANDEM_MOTION_MISMATCH = 208,
   TANDEM_NO_ORIENTED_BLOCKS = 209, TANDEM_NO_AXIS_ALIGNED_BLOCKS = 210, TANDEM_NO_TOPOLOGY = 211, TANDEM_NO_FINEST_LEVEL = 212,
   TANDEM_BAD_REACH = 213, TANDEM_BAD_TOLERANCE = 214, TANDEM_BAD_DURATION = 215, TANDEM_NO_MASS = 216,
+  TANDEM_BAD_JOINT = 217, TANDEM_NO_AXIS = 218, TANDEM_JOINS_NOTHING = 219,
   // A GPU (tandem_cuda.h).
   TANDEM_NO_GPU = 300, TANDEM_DRIVER_TOO_OLD = 301, TANDEM_GPU_NOT_SUPPORTED = 302,
   TANDEM_OUT_OF_GPU_MEMORY = 303, TANDEM_CUDA_FAILED = 304
@@ -817,6 +818,27 @@ TANDEM_API void tandem_world_destroy(tandem_world* world);
 TANDEM_API tandem_status tandem_world_set_assets(tandem_world* world, tandem_asset* const* assets,
                                                  size_t count);
 
+/// Says how a joint lets body b move against body a: about the anchor; about an axis through it, by an angle;
+/// along the axis, by a way; not at all; or so that the anchors keep a distance between bounds.
+enum { TANDEM_BALL = 0, TANDEM_HINGE = 1, TANDEM_SLIDER = 2, TANDEM_FIXED_JOINT = 3, TANDEM_DISTANCE = 4 };
+
+/// Two bodies, of which at least one moves, joined as they are placed. Anchors and axis are those of the
+/// world at that time, and the bodies carry them along.
+typedef struct tandem_joint {
+  uint32_t kind;       ///< TANDEM_BALL, ...
+  uint32_t a, b;       ///< bodies; TANDEM_NO_INDEX: the world
+  uint8_t has_limits;  ///< 1: least and most count, of a hinge, slider or distance
+  uint8_t may_touch;   ///< 1: the two bodies have contacts with each other
+  uint8_t reserved[2];
+  double anchor[3];    ///< where they are joined; of a distance, the point of a
+  double anchor_b[3];  ///< of a distance alone: the point of b
+  double axis[3];      ///< of a hinge or slider: of any length
+  double least, most;  ///< of the angle or way, which is 0 as the bodies are placed, or of the distance,
+                       ///< which without limits stays what it is; may be infinite
+  double speed;        ///< that the motor of a hinge or slider drives b at, against a
+  double most_effort;  ///< its greatest torque or force; 0: there is no motor
+} tandem_joint;
+
 /// How bodies start. Arrays have `count` entries, one for each body (TANDEM_MOTION_MISMATCH where there are
 /// others), or are null.
 typedef struct tandem_body_start {
@@ -833,13 +855,17 @@ typedef struct tandem_body_start {
   const double* restitution;
   const double* rolling_resistance;
   const double* gravity_scale;  ///< part of gravity that acts on each; null: 1. 0: it floats
+  const tandem_joint* joints;   ///< joint_count of them, or null
+  size_t joint_count;
 } tandem_body_start;
 
 /// Places all bodies anew, at time 0. filter: or null; a sleeping body starts awake. start: or null. Result:
 /// as of tandem_scene_place(); also, where tandem_world_where() is the body, TANDEM_OUT_OF_RANGE of a
 /// velocity or gravity_scale that is not finite, or of a friction, restitution or rolling resistance that is
 /// larger than options may be, and TANDEM_NO_MASS where a moving body's mesh has no extent or its density is
-/// not positive; TANDEM_NO_TOPOLOGY, where it is the asset. After an error there are no bodies.
+/// not positive; TANDEM_NO_TOPOLOGY, where it is the asset; and where it is the joint,
+/// TANDEM_UNKNOWN_INSTANCE, TANDEM_JOINS_NOTHING, TANDEM_NO_AXIS and, of numbers that its kind cannot have,
+/// TANDEM_BAD_JOINT. After an error there are no bodies.
 TANDEM_API tandem_status tandem_world_set_bodies(tandem_world* world, const tandem_instance* instances,
                                                  size_t count, const tandem_pair_filter* filter,
                                                  const tandem_body_start* start);
@@ -885,6 +911,23 @@ TANDEM_API const tandem_object_pair* tandem_world_touching(const tandem_world* w
 TANDEM_API const tandem_object_pair* tandem_world_began(const tandem_world* world, size_t* count);
 TANDEM_API const tandem_object_pair* tandem_world_ended(const tandem_world* world, size_t* count);
 
+/// What a joint did in the last step, and where it is.
+typedef struct tandem_world_joint {
+  double position;      ///< angle, which counts whole turns, way, or distance; 0 of others
+  double speed;         ///< by which it changes
+  double impulse[3];    ///< on b at its anchor, on a the opposite one, in the world. Newton seconds
+  double turning[3];    ///< the same of torques. Newton metre seconds
+  double motor_effort;  ///< mean torque or force of the motor in the step, along the axis on b
+} tandem_world_joint;
+
+/// Returns the joints in the order they were given. Valid as long as tandem_world_bodies().
+TANDEM_API const tandem_world_joint* tandem_world_joints(const tandem_world* world, size_t* count);
+
+/// Gives the motor of a hinge or slider another speed and greatest effort, and wakes the bodies. Result:
+/// TANDEM_BAD_JOINT, where tandem_world_where() is the joint.
+TANDEM_API tandem_status tandem_world_set_motor(tandem_world* world, uint32_t joint, double speed,
+                                                double most_effort);
+
 /// Returns the seconds of all steps since bodies were placed.
 TANDEM_API double tandem_world_time(const tandem_world* world);
 
@@ -920,8 +963,8 @@ TANDEM_API tandem_status tandem_world_restore(tandem_world* world, const tandem_
 /// Destroys the handle; null does nothing.
 TANDEM_API void tandem_world_state_destroy(tandem_world_state* state);
 
-/// The asset or body that is to blame for the last call's error; 0 after TANDEM_OK, and where the status
-/// alone says what is wrong.
+/// The asset, body or joint that is to blame for the last call's error; 0 after TANDEM_OK, and where the
+/// status alone says what is wrong.
 TANDEM_API uint64_t tandem_world_where(const tandem_world* world);
 
 #ifdef __cplusplus

@@ -1,5 +1,6 @@
 #pragma once
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <span>
 
@@ -39,6 +40,40 @@ struct WorldContact {
   double impulse[3];  ///< on b, friction included; on a the opposite one. Newton seconds
 };
 
+/// Says how a joint lets body b move against body a.
+enum class JointKind : std::uint8_t {
+  ball,      ///< turns about the anchor
+  hinge,     ///< turns about an axis through the anchor: by an angle, right-handed
+  slider,    ///< moves along the axis: by a way
+  fixed,     ///< not at all
+  distance,  ///< its anchor keeps a distance from a's, between bounds: a rod, or a rope
+};
+
+/// A joint as it enters a world: two bodies, of which at least one moves, joined as they are placed. Anchors
+/// and axes are those of the world at that time, and the bodies carry them along.
+struct JointDescription {
+  JointKind kind = JointKind::ball;
+  std::uint32_t a = kNoIndex, b = kNoIndex;  ///< bodies; kNoIndex: the world
+  double anchor[3] = {};                     ///< where they are joined; of a distance, the point of a
+  double anchor_b[3] = {};                   ///< of a distance alone: the point of b
+  double axis[3] = {0, 0, 1};                ///< of a hinge or slider: of any length
+  /// Bounds of the angle or way, which are 0 as the bodies are placed; or of a distance, where none means
+  /// that it stays what it is. Balls and fixed joints have none.
+  double least = -std::numeric_limits<double>::infinity(), most = std::numeric_limits<double>::infinity();
+  double speed = 0;        ///< that the motor of a hinge or slider drives b at, against a
+  double most_effort = 0;  ///< its greatest torque or force; 0: there is no motor
+  bool may_touch = false;  ///< the two bodies have contacts with each other
+};
+
+/// What a joint did in the last step, and where it is.
+struct WorldJoint {
+  double position;      ///< angle, which counts whole turns, way, or distance; 0 of others
+  double speed;         ///< by which it changes
+  double impulse[3];    ///< on b at its anchor, on a the opposite one, in the world. Newton seconds
+  double turning[3];    ///< the same of torques. Newton metre seconds
+  double motor_effort;  ///< mean torque or force of the motor in the step, along the axis on b
+};
+
 struct WorldOptions {
   double gravity[3] = {0, 0, -9.81};
   double friction = 0.5;   ///< Coulomb's coefficient; as the next and rolling resistance, of bodies whose
@@ -54,8 +89,8 @@ struct WorldOptions {
   std::uint32_t threads = 1;       ///< from 1 to kMostSceneThreads; no result depends on it
 };
 
-/// Rigid bodies of meshes that move under gravity and contacts. Contacts are those of ContactQuery and
-/// ManifoldQuery, exact for any mesh; docs/dynamics.md says how they are solved and what holds. Throws
+/// Rigid bodies of meshes that move under gravity, contacts and joints. Contacts are those of ContactQuery
+/// and ManifoldQuery, exact for any mesh; docs/dynamics.md says how they are solved and what holds. Throws
 /// nothing. Movable, not copyable. One call at a time; several worlds may be used side by side. The same
 /// calls give the same bytes, for any number of threads.
 class World {
@@ -73,9 +108,10 @@ class World {
   /// Scene::place(), and where() is the body; kOutOfRange where a velocity or gravity_scale is not finite, or
   /// a number of the material is larger than WorldOptions may have; kNoTopology where its mesh has none, and
   /// kNoMass where it has no extent or the density is not positive, of a moving body; kBadOption, where
-  /// where() is 0: an option is out of its range; kOutOfMemory. After an error there are no bodies.
+  /// where() is 0: an option is out of its range; kOutOfMemory. Of a joint, where where() is its place in the
+  /// list: kUnknownInstance, kBadJoint, kNoAxis, kJoinsNothing. After an error there are no bodies.
   Status set_bodies(std::span<const BodyDescription> bodies, const WorldOptions& options = {},
-                    std::span<const ObjectPair> excluded = {});
+                    std::span<const ObjectPair> excluded = {}, std::span<const JointDescription> joints = {});
 
   /// Makes steps of dt seconds. Result: kOk; kBadDuration where dt is not more than 0 or more than 1000;
   /// kOutOfRange where a body has left the range of numbers that questions take, and where() is the body;
@@ -97,6 +133,13 @@ class World {
   std::span<const ObjectPair> touching() const;
   std::span<const ObjectPair> began() const;
   std::span<const ObjectPair> ended() const;
+
+  /// What the joints did in the last step, in the order given to set_bodies(). Valid until the next call.
+  std::span<const WorldJoint> joints() const;
+
+  /// Gives the motor of a hinge or slider another speed and greatest effort, see JointDescription, and wakes
+  /// the bodies. Result: kOk; kBadJoint.
+  Status set_motor(std::uint32_t joint, double speed, double most_effort);
 
   /// Returns the seconds of all steps since set_bodies().
   double time() const;

@@ -84,6 +84,9 @@ enum class [[nodiscard]] Status : std::uint32_t{
     kBadTolerance,    ///< a tolerance is negative, NaN or larger than the query can take
     kBadDuration,     ///< a step's length is negative or not finite
     kNoMass,          ///< a moving body's mesh has no extent, or its density is not a positive number
+    kBadJoint,        ///< a joint that there is not, or with numbers that its kind cannot have
+    kNoAxis,          ///< the axis of a hinge or slider has no direction
+    kJoinsNothing,    ///< a joint of a body with itself, or of two that nothing moves
     // These are of a GPU; status_of() of gpu_status.h names CUDA's errors.
     kNoGpu = 300,      ///< none here, none that this process may use, or no driver
     kDriverTooOld,     ///< for the CUDA version that the program was built with

@@ -17,9 +17,9 @@ Vector3 direction_apart(const JointGeometry& g) {
 }
 
 // Adds rows of one joint.
-class RowMaker {
+class DirectionMaker {
  public:
-  explicit RowMaker(const JointGeometry& geometry) : g_(geometry) {}
+  explicit DirectionMaker(const JointGeometry& geometry) : g_(geometry) {}
 
   // The anchors move against each other along a direction. The force acts at b's anchor, or the two would
   // turn each other where they are apart.
@@ -108,7 +108,7 @@ JointGeometry middle(const JointGeometry& p, const JointGeometry& q) {
 }
 
 double free_speed(const Joint& joint, const JointGeometry& g, const BodyState& a, const BodyState& b) {
-  const RowMaker rows(g);
+  const DirectionMaker rows(g);
   switch (joint.kind) {
     case JointKind::hinge:
       return rows.about(g.axis).speed_of(a, b);
@@ -129,7 +129,7 @@ void follow(const Joint& joint, const BodyState& a, const BodyState& b, double t
 }
 
 JointDirections directions_of(const Joint& joint, const JointGeometry& g) {
-  RowMaker rows(g);
+  DirectionMaker rows(g);
   switch (joint.kind) {
     case JointKind::ball:
     case JointKind::hinge:

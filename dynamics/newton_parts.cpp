@@ -40,7 +40,10 @@ class Parts {
     for (const std::uint32_t joint : joints) take(input.joints[joint].a), take(input.joints[joint].b);
     std::sort(driven_.begin(), driven_.end());
     driven_.erase(std::unique(driven_.begin(), driven_.end()), driven_.end());
-    for (const ContactPoint& contact : contacts_) anchors_.push_back(anchor_of(contact, states_));
+    for (const ContactPoint& contact : contacts_) {
+      anchors_.push_back(anchor_of(contact, states_));
+      normals_.push_back(rotated(conjugated(states_[contact.body_a].orientation), contact.normal));
+    }
   }
 
   // Makes a part; `impulses` of the contacts are what it starts with and then what it did.
@@ -56,7 +59,10 @@ class Parts {
     if (!residual) return {};
     apply_solution(problem, part, states_, impulses);
     for (const std::uint32_t body : driven_) advance(input_.bodies[body], states_[body], {}, {}, dt);
-    for (std::size_t i = 0; i < contacts_.size(); ++i) carry(contacts_[i], anchors_[i], states_);
+    for (std::size_t i = 0; i < contacts_.size(); ++i) {
+      contacts_[i].normal = normalized(rotated(states_[contacts_[i].body_a].orientation, normals_[i]));
+      carry(contacts_[i], anchors_[i], states_);
+    }
     for (const std::uint32_t i : one_.joints) {
       const Joint& joint = input_.joints[i];
       follow(joint, state_of(joint.a, states_), state_of(joint.b, states_), dt, input_.joint_memory[i]);
@@ -74,6 +80,7 @@ class Parts {
   std::vector<std::uint32_t> driven_;  // kinematic bodies that the island meets
   std::vector<ContactPoint> contacts_;
   std::vector<ContactAnchor> anchors_;
+  std::vector<Vector3> normals_;  // in a's frame
 };
 
 }  // namespace

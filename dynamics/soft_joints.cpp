@@ -7,13 +7,8 @@
 namespace tandem::dynamics {
 namespace {
 
-void put(const Vector3& x, float (&to)[4]) {
-  to[0] = static_cast<float>(x.x), to[1] = static_cast<float>(x.y), to[2] = static_cast<float>(x.z);
-}
-
 Vector6 of_masses(const MassScale& scale, const SoftMotion& motion) {
-  const auto &c = motion.centre, &s = motion.spin;
-  return {scale.root_mass * Vector3{c[0], c[1], c[2]}, {s[0], s[1], s[2]}};
+  return {scale.root_mass * first_three(motion.centre), first_three(motion.spin)};
 }
 
 }  // namespace
@@ -50,7 +45,8 @@ void SoftJoints::start(const StepInput& input, std::span<const std::uint32_t> is
     return static_cast<std::uint32_t>(std::ranges::lower_bound(place_, place[body]) - place_.begin());
   };
   for (const std::uint32_t joint : problem_.joints)
-    add_joint_rows(problem_, input, joint, own_place(input.joints[joint].a), own_place(input.joints[joint].b));
+    add_joint_rows(problem_, input, joint, own_place(input.joints[joint].a),
+                   own_place(input.joints[joint].b));
   for (JointRow& row : problem_.joint_rows) {
     for (double* of_step : {&row.impulse, &row.least_push, &row.most_push}) *of_step *= scale_;
   }

@@ -8,14 +8,27 @@
 
 namespace tandem::dynamics {
 
+inline void put(const Vector3& x, float (&to)[4]) {
+  to[0] = static_cast<float>(x.x), to[1] = static_cast<float>(x.y), to[2] = static_cast<float>(x.z),
+  to[3] = 0;
+}
+
+/// Lanes that are left out together may leave a zero its sign; here it has none.
+inline double unsigned_zero(float x) {
+  return x + 0.0;
+}
+inline Vector3 first_three(const float (&from)[4]) {
+  return {unsigned_zero(from[0]), unsigned_zero(from[1]), unsigned_zero(from[2])};
+}
+
 /// The joints of a soft step. One thread visits them, in float64, between the sweeps over contacts.
 class SoftJoints {
  public:
-  /// Takes the joints of islands, at the start of a step. place: of each body of the step in `bodies` and in all
-  /// lists of motions below. unit: of masses.
-  void start(const StepInput& input, std::span<const std::uint32_t> islands, std::span<const BodyState> states,
-             std::span<const std::uint32_t> place, std::span<const SteppedBody> bodies, double substeps,
-             double unit);
+  /// Takes the joints of islands, at the start of a step. place: of each body of the step in `bodies` and in
+  /// all lists of motions below. unit: of masses.
+  void start(const StepInput& input, std::span<const std::uint32_t> islands,
+             std::span<const BodyState> states, std::span<const std::uint32_t> place,
+             std::span<const SteppedBody> bodies, double substeps, double unit);
 
   bool empty() const { return blocks_.empty(); }
 
@@ -39,9 +52,9 @@ class SoftJoints {
   void add_impulses(double sign, std::vector<Vector6>& to) const;
 
   const StepInput* input_ = nullptr;
-  IslandProblem problem_;                   // of bodies that have joints, and without contacts
-  std::vector<std::uint32_t> place_;        // of each of its bodies
-  std::vector<Vector6> at_start_, due_;     // velocities, and what is to be added to them
+  IslandProblem problem_;                // of bodies that have joints, and without contacts
+  std::vector<std::uint32_t> place_;     // of each of its bodies
+  std::vector<Vector6> at_start_, due_;  // velocities, and what is to be added to them
   std::vector<JointBlock> blocks_;
   double scale_ = 1;  // of an impulse of the step to one of a substep
 };

@@ -21,10 +21,6 @@ std::uint32_t shuffled(std::uint32_t a, std::uint32_t b) {
   return static_cast<std::uint32_t>(x >> 32);
 }
 
-void put(const Vector3& x, float (&to)[4]) {
-  to[0] = static_cast<float>(x.x), to[1] = static_cast<float>(x.y), to[2] = static_cast<float>(x.z),
-  to[3] = 0;
-}
 void put(double x, SoftNumber& to, int lane) {
   to.of[lane] = static_cast<float>(x);
 }
@@ -38,13 +34,6 @@ void put(const MassScale& scale, SoftNumber (&to)[9], int lane) {
 }
 void put(const ContactRow& row, const Vector3& along, SoftDirection& to, int lane) {
   put(along, to.along, lane), put(row.a.angular, to.turn_a, lane), put(row.b.angular, to.turn_b, lane);
-}
-// Lanes that are left out together may leave a zero its sign; here it has none.
-double unsigned_zero(float x) {
-  return x + 0.0;
-}
-Vector3 first_three(const float (&from)[4]) {
-  return {unsigned_zero(from[0]), unsigned_zero(from[1]), unsigned_zero(from[2])};
 }
 double inverse_mass(const SteppedBody& body) {
   return body.moves ? 1 / (body.scale.root_mass * body.scale.root_mass) : 0;

@@ -80,6 +80,10 @@ class IslandSolver final : public StepSolver {
       }
       const Plan plan = plan_of(input, i, layers);
       if (!plan.by_newton) return;
+      if (const std::uint32_t parts = parts_of(input, i, states); parts > 1)
+        by_newton[i] = solve_newton_parts(input, i, parts, options_, layers, place_, plan.order,
+                                          JointRule::exact, states, impulses);
+      if (by_newton[i]) return;
       IslandProblem problem = make_island_problem(input, i, start, options_, layers, place_, plan.order);
       bool turned_far = false;
       by_newton[i] = solve_newton_step(problem, input, options_, JointRule::exact, &turned_far);
@@ -111,6 +115,21 @@ class IslandSolver final : public StepSolver {
     bool by_newton;
     std::vector<std::uint32_t> order;  // of bodies; empty: by layer
   };
+
+  // Bodies that spin fast about the normal of a contact, as tops do, have a step in parts, in which their
+  // contacts turn with them. Joints find their parts by themselves.
+  static std::uint32_t parts_of(const StepInput& input, std::size_t island,
+                                std::span<const BodyState> states) {
+    constexpr double kTurn = 0.1, kMostParts = 16;  // radians in a part
+    if (!input.islands.joints_of(island).empty()) return 1;
+    double turn = 0;
+    for (const std::uint32_t i : input.islands.contacts_of(island)) {
+      const ContactPoint& contact = input.contacts[i];
+      const Vector3 spin = states[contact.body_b].angular_velocity - states[contact.body_a].angular_velocity;
+      turn = std::max(turn, input.dt * std::fabs(dot(contact.normal, spin)));
+    }
+    return static_cast<std::uint32_t>(std::min(std::floor(turn / kTurn) + 1, kMostParts));
+  }
 
   // A step in which joints turn far takes as many parts as that asks for.
   std::optional<Residual> solve_in_parts(const StepInput& input, std::size_t island, const Plan& plan,

@@ -193,6 +193,55 @@ TEST(SoftPasses, EveryVariantGivesTheSameBytes) {
   EXPECT_NE(std::memcmp(scalar.velocities.data(), RandomRows().velocities.data(), sizeof(SoftMotion)), 0);
 }
 
+// A cube of bodies that touch those beside them, above a body that is fixed.
+struct CubeStep {
+  static constexpr std::uint32_t kSide = 16;
+  std::vector<BodyProperties> bodies = std::vector<BodyProperties>(kSide * kSide * kSide + 1);
+  std::vector<BodyState> states = std::vector<BodyState>(bodies.size());
+  std::vector<Pull> pulls = std::vector<Pull>(bodies.size(), Pull{{0, 0, -9.81}, {}});
+  std::vector<ContactPoint> contacts;
+
+  CubeStep() {
+    std::mt19937 random(11);
+    std::uniform_real_distribution<double> number(-1, 1);
+    const auto any = [&] { return Vector3{number(random), number(random), number(random)}; };
+    bodies[0].motion = Motion::fixed;
+    for (std::uint32_t i = 1; i < bodies.size(); ++i) {
+      const std::uint32_t k = i - 1;
+      states[i].position = {k % kSide + 0.5, k / kSide % kSide + 0.5, k / (kSide * kSide) + 0.5};
+      states[i].velocity = 0.1 * any(), states[i].angular_velocity = any();
+      if (k < kSide * kSide) touch(0, i, {0, 0, 1});
+      if (k % kSide > 0) touch(i - 1, i, {1, 0, 0});
+      if (k / kSide % kSide > 0) touch(i - kSide, i, {0, 1, 0});
+      if (k >= kSide * kSide) touch(i - kSide * kSide, i, {0, 0, 1});
+    }
+    std::ranges::sort(contacts, {}, [](const ContactPoint& c) { return std::pair(c.body_a, c.body_b); });
+  }
+  void touch(std::uint32_t a, std::uint32_t b, const Vector3& normal) {
+    for (const double side : {-0.3, 0.3}) {
+      const Vector3 across = side * unit_orthogonal(normal);
+      contacts.push_back({a, b, states[b].position - 0.5 * normal + across, normal, 1e-3 * side, 0});
+    }
+  }
+  std::vector<BodyState> solved(std::uint32_t count) const {
+    Threads threads(count);
+    const Islands islands = find_islands(bodies, contacts);
+    std::vector<ContactImpulse> impulses(contacts.size());
+    std::vector<BodyState> moved = states;
+    make_step_solver({.kind = SolverKind::soft, .restitution = 0.3})
+        ->step({bodies, contacts, islands, 1.0 / 60, pulls, 0, true, threads}, moved, impulses);
+    return moved;
+  }
+};
+
+TEST(SoftSolver, GivesTheSameBytesByAnyNumberOfThreads) {
+  const CubeStep cube;
+  const std::vector<BodyState> alone = cube.solved(1);
+  for (const std::uint32_t threads : {2u, 3u, 8u}) expect_same(cube.solved(threads), alone, "states");
+  EXPECT_TRUE(std::ranges::all_of(alone, is_usable));
+  EXPECT_NE(norm(alone[1].velocity - cube.states[1].velocity), 0);
+}
+
 TEST(Phases, EachBeginsWhenTheOneBeforeIsDone) {
   constexpr std::size_t kPhases = 2000;
   for (const std::uint32_t workers : {1u, 2u, 5u}) {

@@ -390,11 +390,11 @@ class World:
     def joints(self) -> Rows:
         """What the joints did in the last step, a copy, array of WORLD_JOINT in the order they were given: angle, way or distance, its speed, and impulses.
 
-        >>> rod = tandem.Joint("ball", None, 0, anchor=[0, 0, 5])
-        >>> world = tandem.World([box], translation=[[0, 0, 4]], joints=[rod])
-        >>> world.step(1 / 60)
-        >>> (world.joints["impulse"][0] * 60 / world.mass[0]).round(2).tolist()
-        [0.0, 0.0, 9.81]
+        >>> hinge = tandem.Joint("hinge", None, 0, anchor=[0, 0, 5], axis=[0, 0, 1], speed=2, most_effort=1e6)
+        >>> world = tandem.World([box], translation=[[0, 0, 4]], joints=[hinge])
+        >>> world.step(1 / 60, 30)
+        >>> world.joints["speed"].round(3).tolist()
+        [2.0]
         """
         return np.frombuffer(self._core.joints(), WORLD_JOINT)
 

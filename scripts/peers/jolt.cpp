@@ -83,10 +83,13 @@ ShapeRefC shape_of(const PeerBody& body) {
 }  // namespace
 
 const char* peer_version() {
-  static const std::string text = std::to_string(JPH_VERSION_MAJOR) + "." + std::to_string(JPH_VERSION_MINOR) + "." + std::to_string(JPH_VERSION_PATCH);
+  static const std::string text = std::to_string(JPH_VERSION_MAJOR) + "." +
+                                  std::to_string(JPH_VERSION_MINOR) + "." + std::to_string(JPH_VERSION_PATCH);
   return text.c_str();
 }
-const char* peer_settings() { return "10 velocity and 2 position iterations; no damping"; }
+const char* peer_settings() {
+  return "10 velocity and 2 position iterations; no damping";
+}
 
 void peer_create(double gravity, const PeerBody* bodies, long count) {
   static const Setup setup;
@@ -97,19 +100,24 @@ void peer_create(double gravity, const PeerBody* bodies, long count) {
   for (const PeerBody* body = bodies; body < bodies + count; ++body) {
     const bool moves = body->density > 0;
     const double* q = body->quaternion;
-    const Quat turned(static_cast<float>(q[0]), static_cast<float>(q[1]), static_cast<float>(q[2]), static_cast<float>(q[3]));
+    const Quat turned(static_cast<float>(q[0]), static_cast<float>(q[1]), static_cast<float>(q[2]),
+                      static_cast<float>(q[3]));
     BodyCreationSettings settings(shape_of(*body), RVec3(vector(body->position)), turned.Normalized(),
-                                  moves ? EMotionType::Dynamic : EMotionType::Static, moves ? kMoving : kFixed);
+                                  moves ? EMotionType::Dynamic : EMotionType::Static,
+                                  moves ? kMoving : kFixed);
     settings.mFriction = static_cast<float>(body->friction);
     settings.mLinearDamping = settings.mAngularDamping = 0;
     settings.mLinearVelocity = vector(body->velocity);
     settings.mAngularVelocity = vector(body->angular_velocity);
-    world->bodies.push_back(made.CreateAndAddBody(settings, moves ? EActivation::Activate : EActivation::DontActivate));
+    world->bodies.push_back(
+        made.CreateAndAddBody(settings, moves ? EActivation::Activate : EActivation::DontActivate));
   }
   world->system.OptimizeBroadPhase();
 }
 
-void peer_step(double seconds) { world->system.Update(static_cast<float>(seconds), 1, &world->memory, &world->jobs); }
+void peer_step(double seconds) {
+  world->system.Update(static_cast<float>(seconds), 1, &world->memory, &world->jobs);
+}
 
 void peer_positions(double* positions) {
   const BodyInterface& bodies = world->system.GetBodyInterfaceNoLock();

@@ -1,5 +1,5 @@
 """The table of what scripts/dynamics_peers measured."""
-from common.tabular import markdown, three_digits
+from common.tabular import markdown
 
 ENGINES = {"tandem": "Tandem", "box3d": "Box3D", "jolt": "Jolt", "mujoco": "MuJoCo", "mujoco, stiff": "MuJoCo, stiff", "pybullet": "PyBullet"}
 # Scenes in words, by case and variant, with the quantity that is shown.
@@ -12,7 +12,7 @@ FALLEN = 0.5  # metres
 
 
 def peers(rows):
-    """Drift in mm and milliseconds a step, by scene and engine; a run that ended early has its time alone."""
+    """Drift in mm, bold where it holds, and milliseconds a step, by scene and engine; a run that ended early has its time alone."""
     found = {(row["engine"], row["case"], row["variant"], row["quantity"]): row for row in rows}
     lines = [[words, *(_cell(found.get((engine, *scene, quantity))) for engine in ENGINES)] for scene, (words, quantity) in SCENES.items()]
     return markdown(["scene", *ENGINES.values()], lines)
@@ -21,8 +21,12 @@ def peers(rows):
 def _cell(row):
     if row is None:
         return "–"
-    time = f"{three_digits(float(row['ms_per_step']))} ms"
+    drift, time = float(row["value"] or 0), _two_digits(float(row["ms_per_step"]))
     if not row["verdict"]:
-        return f"not done, {time}"
-    drift = float(row["value"])
-    return f"{'falls' if drift > FALLEN else '< 0.01' if drift < 1e-5 else f'{1e3 * drift:.2g}' if drift < 0.1 else f'{1e3 * drift:.0f}'}, {time}"
+        return f"not done; {time}"
+    shown = "falls" if drift > FALLEN else "< 0.01" if drift < 1e-5 else _two_digits(1e3 * drift)
+    return f"**{shown}**; {time}" if row["verdict"] == "holds" else f"{shown}; {time}"
+
+
+def _two_digits(value):
+    return f"{float(f'{value:.2g}'):,g}"

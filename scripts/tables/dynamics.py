@@ -1,0 +1,32 @@
+"""The table of what scripts/dynamics_peers measured."""
+from common.tabular import markdown
+
+ENGINES = {"tandem": "Tandem", "box3d": "Box3D", "jolt": "Jolt", "mujoco": "MuJoCo", "mujoco, stiff": "MuJoCo, stiff", "pybullet": "PyBullet"}
+# Scenes in words, by case and variant, with the quantity that is shown.
+SCENES = {("tower30", "jittered"): ("tower of 30", "largest drift"), ("masses", "heavy on light, 1000:1"): ("heavy on light, 1,000:1", "largest drift"),
+          ("masses", "heavy on nine, 1000:1"): ("heavy on nine, 1,000:1", "largest drift"), ("stack", "5^3"): ("stack of 5³", "largest drift"),
+          ("pyramid", "base 20"): ("pyramid of 210", "largest drift"), ("pyramid", "base 100"): ("pyramid of 5,050", "largest drift"),
+          ("arch", "15 wedges"): ("arch of 15 wedges", "largest drift"), ("dominoes", "50"): ("50 dominoes, fallen", "drift of the last second"),
+          ("heap", "300 convex"): ("heap of 300 convex bodies", "drift of the last second")}
+FALLEN = 0.5  # metres
+
+
+def peers(rows):
+    """Drift in mm, bold where it holds, and milliseconds a step, by scene and engine; a run that ended early has its time alone."""
+    found = {(row["engine"], row["case"], row["variant"], row["quantity"]): row for row in rows}
+    lines = [[words, *(_cell(found.get((engine, *scene, quantity))) for engine in ENGINES)] for scene, (words, quantity) in SCENES.items()]
+    return markdown(["scene", *ENGINES.values()], lines)
+
+
+def _cell(row):
+    if row is None:
+        return "–"
+    drift, time = float(row["value"] or 0), _two_digits(float(row["ms_per_step"]))
+    if not row["verdict"]:
+        return f"not done; {time}"
+    shown = "falls" if drift > FALLEN else "< 0.01" if drift < 1e-5 else _two_digits(1e3 * drift)
+    return f"**{shown}**; {time}" if row["verdict"] == "holds" else f"{shown}; {time}"
+
+
+def _two_digits(value):
+    return f"{float(f'{value:.2g}'):,g}"

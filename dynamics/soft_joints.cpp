@@ -33,7 +33,7 @@ void SoftJoints::start(const StepInput& input, std::span<const std::uint32_t> is
     }
   }
   std::ranges::sort(place_);
-  place_.erase(std::ranges::unique(place_).begin(), place_.end());
+  place_.erase(std::unique(place_.begin(), place_.end()), place_.end());
   for (const std::uint32_t i : place_) {
     problem_.scale.push_back(bodies[i].scale);
     at_start_.push_back(bodies[i].velocity);

@@ -235,8 +235,7 @@ Preparation prepare_scene(const std::string& path, const bench::LoadedScene& sce
     const double body_density = motion.density.empty() ? density : motion.density[i];
     add_body(all, bodies.body(shape, mover, body_density, all.findings), instances[i].pose, shapes[shape]);
     const auto vector_of = [i](const std::vector<double>& numbers) {
-      return numbers.empty() ? Vector3(Vector3{})
-                             : Vector3(numbers[3 * i], numbers[3 * i + 1], numbers[3 * i + 2]);
+      return numbers.empty() ? Vector3{} : Vector3{numbers[3 * i], numbers[3 * i + 1], numbers[3 * i + 2]};
     };
     if (mover == Motion::fixed) continue;
     all.states.back().velocity = vector_of(motion.velocity);

@@ -118,7 +118,7 @@ const std::vector<ContactPoint>& AnalyticContacts::find(std::span<const BodyPose
   std::vector<ObjectPair> pairs(keeping.remembered.begin(), keeping.remembered.end());
   for (const ContactPoint& point : points_) pairs.push_back({point.body_a, point.body_b});
   std::ranges::sort(pairs);
-  pairs.erase(std::ranges::unique(pairs).begin(), pairs.end());
+  pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
   std::vector<double> radii;
   for (std::uint32_t i = 0; i < bodies.size(); ++i) radii.push_back(radius(i));
   kept_ = judge_.kept(pairs, bodies, radii, keeping.tolerance);

@@ -27,7 +27,7 @@ struct BoxOnSlab {
     std::vector<ObjectPair> pairs = cache.pairs();
     for (const ContactPoint& point : found) pairs.push_back({point.body_a, point.body_b});
     std::ranges::sort(pairs);
-    pairs.erase(std::ranges::unique(pairs).begin(), pairs.end());
+    pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
     std::vector<BodyPose> poses;
     std::vector<double> radii;
     for (std::size_t i = 0; i < bodies.size(); ++i) {

@@ -20,11 +20,10 @@ void take_points(const ManifoldQuery& manifolds, std::span<const ObjectPair> pai
   statistics = {manifolds.counters(), 0, 0};
   for (const Manifold& manifold : manifolds.rows()) {
     const ObjectPair& pair = pairs[manifold.pair];
-    const Vector3 normal = vector_of(manifold.normal);
-    statistics.area += std::fabs(dot(vector_of(manifold.area_vector), normal));
+    statistics.area += std::fabs(dot(vector_of(manifold.area_vector), vector_of(manifold.normal)));
     statistics.depth = std::max(statistics.depth, manifold.depth);
     for (const ManifoldPoint& p : manifolds.points().subspan(manifold.first_point, manifold.point_count))
-      points.push_back({pair.a, pair.b, vector_of(p.position), normal, p.depth, p.id});
+      points.push_back({pair.a, pair.b, vector_of(p.position), vector_of(p.normal), p.depth, p.id});
   }
 }
 

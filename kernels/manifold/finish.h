@@ -24,7 +24,6 @@ template <typename Team>
 class PointMatcher {
  public:
   struct Step {
-    const Manifold* manifolds;
     const ManifoldPoint* points;
     std::uint32_t first, count;  ///< the pair's points
   };
@@ -32,9 +31,9 @@ class PointMatcher {
   TANDEM_HD PointMatcher(const Team& team, double smaller_diagonal)
       : team_(team), reach_(kSamePoint * smaller_diagonal) {}
 
-  TANDEM_HD void match(ManifoldPoint* points, const Manifold* manifolds, std::uint32_t first,
-                       std::uint32_t count, const Step& before) const {
-    const Step now = {manifolds, points, first, count};
+  TANDEM_HD void match(ManifoldPoint* points, std::uint32_t first, std::uint32_t count,
+                       const Step& before) const {
+    const Step now = {points, first, count};
     if constexpr (std::is_base_of_v<OneThread, Team>) {
       if (std::uint64_t{count} * before.count > kFewComparisons) return match_many(points, now, before);
     }
@@ -83,7 +82,7 @@ class PointMatcher {
     const bool is_nearer = distance < least.distance ||
                            (distance == least.distance && least.point != kNoIndex && other < least.point);
     if (!is_nearer) return;
-    const double(&n)[3] = of.manifolds[p.manifold].normal, (&m)[3] = others.manifolds[q.manifold].normal;
+    const double(&n)[3] = p.normal, (&m)[3] = q.normal;
     if (n[0] * m[0] + n[1] * m[1] + n[2] * m[2] > 0.7) least = {other, distance};
   }
 

@@ -91,7 +91,7 @@ __device__ void move_pair(const ManifoldArgs& args, std::uint32_t pair, std::uin
       const std::uint32_t point_to = kept.first_point + lane;
       const FoundPoint of_point = args.found_points_before[point_from];
       ManifoldPoint point = args.points_before[point_from];
-      motion.move(of_then, of_point, kept, point);
+      motion.move(of_point, point);
       point.previous = args.matches ? point_from : kNoIndex;
       point.manifold = to;
       args.points[point_to] = point;

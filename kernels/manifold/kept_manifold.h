@@ -11,7 +11,7 @@ struct FoundManifold {
   double normal[3], area_vector[3], centre[3];
 };
 struct FoundPoint {
-  double position[3], depth;
+  double position[3], normal[3], depth;
 };
 
 TANDEM_HD inline FoundManifold found(const Manifold& m) {
@@ -22,12 +22,12 @@ TANDEM_HD inline FoundManifold found(const Manifold& m) {
   return out;
 }
 TANDEM_HD inline FoundPoint found(const ManifoldPoint& p) {
-  return {{p.position[0], p.position[1], p.position[2]}, p.depth};
+  return {{p.position[0], p.position[1], p.position[2]}, {p.normal[0], p.normal[1], p.normal[2]}, p.depth};
 }
 
 /// Moves the manifolds of a pair from where its bodies stood to where they stand.
 ///
-/// Normal and area turn with the larger body, whose flat faces they are mostly of. A point stays where it is
+/// Normals and area turn with the larger body, whose flat faces they are mostly of. A point stays where it is
 /// on either body (in_a, in_b). What the bodies move on from there, `shift`, is added to what was found, so
 /// that a pose that is not quite rigid adds no more than a part of the motion, and bodies that stand still
 /// add nothing: their manifolds keep their bytes.
@@ -47,22 +47,23 @@ class KeptMotion {
     write(centre, out.centre);
     if (stands_) return;
     const bool has_normal = normal.x != 0 || normal.y != 0 || normal.z != 0;
-    if (has_normal) write(normalized(turned(normal)), out.normal);
+    if (has_normal) write(turned_normal(normal), out.normal);
     write(turned(area), out.area_vector);
     const Vector3 by_a = shift(0, in_file(0, centre)), by_b = shift(1, in_file(1, centre));
     write(centre + 0.5 * (by_a + by_b), out.centre);
   }
 
-  /// Moves a point and measures its depth anew: less than 0 where the bodies have come apart. `manifold` has
-  /// been moved.
-  TANDEM_HD void move(const FoundManifold& from, const FoundPoint& point_from, const Manifold& manifold,
-                      ManifoldPoint& out) const {
-    write(of(point_from.position), out.position);
-    out.depth = point_from.depth;
+  /// Moves a point and measures its depth anew: less than 0 where the bodies have come apart.
+  TANDEM_HD void move(const FoundPoint& from, ManifoldPoint& out) const {
+    write(of(from.position), out.position);
+    write(of(from.normal), out.normal);
+    out.depth = from.depth;
     if (stands_) return;
-    const Vector3 by_a = shift(0, of(out.in_a)), by_b = shift(1, of(out.in_b)), n = of(manifold.normal);
-    write(of(point_from.position) + 0.5 * (by_a + by_b), out.position);
-    out.depth = dot(n, point_from.depth * of(from.normal) + (by_a - by_b));
+    const Vector3 by_a = shift(0, of(out.in_a)), by_b = shift(1, of(out.in_b));
+    const Vector3 n = turned_normal(of(from.normal));
+    write(of(from.position) + 0.5 * (by_a + by_b), out.position);
+    write(n, out.normal);
+    out.depth = dot(n, from.depth * of(from.normal) + (by_a - by_b));
   }
 
  private:
@@ -97,6 +98,7 @@ class KeptMotion {
     };
     return x + (turn(now_[larger_]) - turn(then_[larger_]));
   }
+  TANDEM_HD Vector3 turned_normal(const Vector3& n) const { return normalized(turned(n)); }
   Pose then_[2], now_[2];
   int larger_;
   bool stands_;

@@ -427,8 +427,10 @@ __global__ void __launch_bounds__(kThreads, 3) measure_depths(const __grid_const
     with_maker(args, team, memory[own], begun.of, [&](auto& maker, PatchState&) {
       const manifold::OverlapLine line =
           maker.line_along(begun.of.curve, search, direction, searches[own].get());
+      const bool through = !is_deep && begun.state.bent && line.found() &&
+                           maker.goes_through(line, search, searches[own].get().lines);
       if (team.rank() != 0) return;
-      if (!is_deep) return maker.take_deepest(line, memory[own].bodies.get(), begun.state);
+      if (!is_deep) return maker.take_deepest(line, through, memory[own].bodies.get(), begun.state);
       deep_lines(begun).along[direction] = line;
       // Numbers above 0 are in the order of their bits.
       atomicMin(reinterpret_cast<Counter*>(&search.enough),

@@ -1,6 +1,7 @@
 #pragma once
 #include "kernels/manifold/patch_normal.h"
 #include "kernels/manifold/patch_rim.h"
+#include "kernels/manifold/patch_sheets.h"
 
 /// The rule by which contacts become manifolds (docs/contacts.md), for CPU and GPU alike.
 namespace tandem::manifold {
@@ -54,8 +55,13 @@ class ManifoldMaker {
   TANDEM_HD double least_depth_along(std::uint32_t region, const DepthSearch& search, int direction,
                                      SearchMemory& shared) const;
 
-  /// Takes the deepest line of a patch that is not deep. It is called by one of the team.
-  TANDEM_HD static void take_deepest(const OverlapLine& line, const BodyPair& bodies, PatchState& state);
+  /// Returns whether a line along the first direction leaves the overlap on its way.
+  TANDEM_HD bool goes_through(const OverlapLine& line, const DepthSearch& search, LineMemory& lines) const;
+
+  /// Takes the deepest line of a patch that is not deep; through: of a bent one, it leaves the overlap on its
+  /// way. It is called by one of the team.
+  TANDEM_HD static void take_deepest(const OverlapLine& line, bool through, const BodyPair& bodies,
+                                     PatchState& state);
 
   /// Finds the direction in which the overlap of a deep patch is shallowest, the rim and depths. If the
   /// bodies do not overlap along any direction, the patch is a touch where its area says how it pushes, and
@@ -78,9 +84,10 @@ class ManifoldMaker {
   TANDEM_HD void place_soundings(const RimFinder<Team>& finder, const Rim& rim);
   TANDEM_HD std::uint32_t ask_at_rim(LineMemory& lines) const;
   TANDEM_HD void take_rim(const LineMemory& lines);
-  TANDEM_HD bool goes_through(const OverlapLine& line, LineMemory& lines) const;
+  TANDEM_HD bool goes_through(const OverlapLine& line, const PatchFrame& frame, LineMemory& lines) const;
   TANDEM_HD Vector2 reach_to_rim(const Sounding& s, double (&height)[2]) const;
   TANDEM_HD void place_candidates(const RimFinder<Team>& finder, ChoiceMemory& shared) const;
+  TANDEM_HD void place_sheets(ChoiceMemory& shared) const;
   TANDEM_HD void keep_apart(int most_of_rim, ChoiceMemory& shared) const;
   TANDEM_HD void write_points(const ChoiceMemory& shared, Patch& patch, int count) const;
   TANDEM_HD void write_manifold(const ChoiceMemory& shared, Patch& patch, int count) const;
@@ -141,7 +148,7 @@ TANDEM_HD void ManifoldMaker<Team>::take_normal(const CurveMeasure& measure, con
     state_.kind = normal.kind;
     state_.has_area = !touch;
     state_.closed = measure.closed || (touch && measure.point);
-    state_.goes_through = false;
+    state_.goes_through = state_.bent = state_.through = false;
     state_.deepest = {};
     state_.rim_points = 0;
     state_.area = measure.area;
@@ -208,7 +215,9 @@ TANDEM_HD void ManifoldMaker<Team>::sound(std::uint32_t region, DepthSearch& sea
   const bool has_rim = state_.kind == PatchKind::overlap;
   DeepestLine<Team>(team_, bodies_, memory_, summary_, region, shared)
       .go_inside(search.seeds, has_rim ? ask_at_rim(shared.lines) : 0);
-  if (has_rim) take_rim(shared.lines);
+  if (!has_rim) return;
+  take_rim(shared.lines);
+  SheetFinder<Team>(team_, bodies_, memory_, state_).find(search.seeds, shared.lines);
 }
 
 template <typename Team>
@@ -258,10 +267,11 @@ TANDEM_HD_CALLED void ManifoldMaker<Team>::end_deep(std::uint32_t region, const 
   team_.sync();
   walk_lines(team_, questions, asked);
   take_rim(lines);
-  const bool through = deepest.found() && goes_through(deepest, lines);
+  SheetFinder<Team>(team_, bodies_, memory_, state_).find(search.seeds, lines);
+  const bool through = deepest.found() && goes_through(deepest, state_.frame, lines);
   if (team_.rank() == 0) {
     state_.goes_through = through;
-    take_deepest(deepest, bodies_, state_);
+    take_deepest(deepest, through, bodies_, state_);
   }
   team_.sync();
 }
@@ -272,8 +282,11 @@ TANDEM_HD void ManifoldMaker<Team>::measure(std::uint32_t region, DepthSearch& s
   outline(region, shared, search);
   if (state_.kind != PatchKind::overlap && state_.kind != PatchKind::deep) return;
   sound(region, search, depths);
-  if (state_.kind == PatchKind::overlap)
-    return take_deepest(line_along(region, search, 0, depths), bodies_, state_);
+  if (state_.kind == PatchKind::overlap) {
+    const OverlapLine line = line_along(region, search, 0, depths);
+    const bool through = state_.bent && line.found() && goes_through(line, search, depths.lines);
+    return take_deepest(line, through, bodies_, state_);
+  }
   DeepLines found;
   // The directions along which the first lines are shallowest come first; of others little more is looked at.
   double known[2 * kMostTried];
@@ -314,14 +327,24 @@ TANDEM_HD void ManifoldMaker<Team>::take_rim(const LineMemory& lines) {
   team_.sync();
 }
 
-/// Returns whether one body ends within the other on a line.
 template <typename Team>
-TANDEM_HD bool ManifoldMaker<Team>::goes_through(const OverlapLine& line, LineMemory& lines) const {
+TANDEM_HD bool ManifoldMaker<Team>::goes_through(const OverlapLine& line, const DepthSearch& search,
+                                                 LineMemory& lines) const {
+  team_.sync();
+  if (team_.rank() == 0) lines.frame[0] = PatchFrame(summary_.origin, search.along(0));
+  team_.sync();
+  return goes_through(line, lines.frame[0], lines);
+}
+
+/// Returns whether one body ends within the other on a line. frame: what all of the team see.
+template <typename Team>
+TANDEM_HD bool ManifoldMaker<Team>::goes_through(const OverlapLine& line, const PatchFrame& frame,
+                                                 LineMemory& lines) const {
   const double tolerance = bodies_.tolerance();
   LineQuestions questions(bodies_, lines.line);
   for (std::uint32_t side = team_.rank(); side < 2; side += team_.size()) {
     const double from = line.height[side];
-    questions.ask(side, state_.frame, static_cast<int>(side), side == 0 ? -1 : 1, line.at, from,
+    questions.ask(side, frame, static_cast<int>(side), side == 0 ? -1 : 1, line.at, from,
                   side == 0 ? -INFINITY : from + tolerance, side == 0 ? from - tolerance : INFINITY, INFINITY,
                   kGrazes);
   }
@@ -336,12 +359,13 @@ TANDEM_HD bool ManifoldMaker<Team>::goes_through(const OverlapLine& line, LineMe
 
 /// What is no deeper than rounding is a touch.
 template <typename Team>
-TANDEM_HD void ManifoldMaker<Team>::take_deepest(const OverlapLine& line, const BodyPair& bodies,
-                                                 PatchState& state) {
+TANDEM_HD void ManifoldMaker<Team>::take_deepest(const OverlapLine& line, bool through,
+                                                 const BodyPair& bodies, PatchState& state) {
   if (line.found() && line.depth() > kNoArea * bodies.reach())
-    state.deepest = line;
+    state.deepest = line, state.through = through;
   else
     state.kind = PatchKind::touch, state.goes_through = false;
+  state.bent = state.bent && state.deepest.found();
 }
 
 /// Returns the place nearest to the point of the rim, on the way to the sounding's line, to which the
@@ -404,9 +428,42 @@ TANDEM_HD void ManifoldMaker<Team>::place_candidates(const RimFinder<Team>& find
         }
       }
     }
+    c.normal = state_.frame.n;
     c.from_middle = norm(c.at - state_.middle);
   }
   team_.sync();
+}
+
+/// The points of a bent patch lie between its surfaces, and have their normals. The deepest line does if it
+/// does not leave the overlap; a wall at which it lies has none.
+template <typename Team>
+TANDEM_HD void ManifoldMaker<Team>::place_sheets(ChoiceMemory& shared) const {
+  int count = 0;
+  const auto add = [&](const Sheet& sheet, Chosen& c) {
+    c.at = state_.frame.flat(sheet.at), c.height = state_.frame.height(sheet.at);
+    c.depth = sheet.depth, c.normal = sheet.normal, c.half = sheet.half;
+    c.triangle[0] = sheet.triangle[0], c.triangle[1] = sheet.triangle[1];
+    c.from_middle = norm(c.at - state_.middle);
+    shared.candidate[count++] = c;
+  };
+  for (int i = 0; i < state_.rim_points; ++i) {
+    if (state_.sheet[i].found) add(state_.sheet[i], shared.candidate[i]);
+  }
+  Chosen c = shared.candidate[state_.rim_points];
+  Sheet sheet;
+  if (!state_.through && state_.deepest.depth() <= kSheet * state_.reach &&
+      find_sheet(bodies_, state_.deepest.triangle, sheet) > 0) {
+    sheet.at = state_.frame.at(c.at, c.height);
+    sheet.depth = c.depth * dot(sheet.normal, state_.frame.n);
+    sheet.half = (c.depth / 2) * state_.frame.n;
+    add(sheet, c);
+  }
+  for (int i = state_.rim_points; i < state_.sheets; ++i) {
+    c.feature = feature_hash(static_cast<std::uint64_t>(i - state_.rim_points + 1), 4);
+    c.deepest = true;
+    if (state_.sheet[i].found) add(state_.sheet[i], c);
+  }
+  shared.count = static_cast<std::uint32_t>(count);
 }
 
 /// Chooses the deepest point, unless one of the rim is as deep, and the first of the rim. Deeper ones come
@@ -414,22 +471,27 @@ TANDEM_HD void ManifoldMaker<Team>::place_candidates(const RimFinder<Team>& find
 /// of one of the rim near it.
 template <typename Team>
 TANDEM_HD void ManifoldMaker<Team>::keep_apart(int most_of_rim, ChoiceMemory& shared) const {
-  int order[kMostRimPoints + 1], count = 0, kept = 0;
+  int order[kMostCandidates] = {}, count = 0, kept = 0;
   const auto before = [&](int i, int j) {
     const Chosen &x = shared.candidate[i], &y = shared.candidate[j];
     return x.depth > y.depth || (x.depth == y.depth && x.from_middle > y.from_middle);
   };
-  int deepest = state_.deepest.found() ? state_.rim_points : -1;
-  for (int i = 0; i < state_.rim_points; ++i) {
-    if (state_.sounding[i].rank >= most_of_rim) continue;
-    if (shared.candidate[i].depth >= state_.deepest.depth() * (1 - kAsDeep)) deepest = -1;
-    int j = count++;  // an insertion that is stable
+  const auto insert = [&](int i) {  // stable
+    int j = count++;
     for (; j > 0 && before(i, order[j - 1]); --j) order[j] = order[j - 1];
     order[j] = i;
-  }
-  if (deepest >= 0) {
-    for (int j = count++; j > 0; --j) order[j] = order[j - 1];
-    order[0] = deepest;
+  };
+  bool has_deepest = state_.deepest.found() && !state_.bent;
+  if (state_.bent) {
+    place_sheets(shared);
+    for (int i = 0; i < static_cast<int>(shared.count); ++i) insert(i);
+  } else {
+    for (int i = 0; i < state_.rim_points; ++i) {
+      if (state_.sounding[i].rank >= most_of_rim) continue;
+      if (shared.candidate[i].depth >= state_.deepest.depth() * (1 - kAsDeep)) has_deepest = false;
+      insert(i);
+    }
+    if (has_deepest) insert(state_.rim_points);
   }
   const double near = kNear * bodies_.smaller_diagonal(),
                near_deepest = greater(near, kNearDeepest * state_.reach);
@@ -439,8 +501,9 @@ TANDEM_HD void ManifoldMaker<Team>::keep_apart(int most_of_rim, ChoiceMemory& sh
     for (int k = 0; k < kept && alone; ++k) {
       Chosen& other = shared.chosen[k];
       const Vector2 apart = other.at - c.at;
-      const double reach = k == 0 && deepest >= 0 ? near_deepest : near;
-      alone = dot(apart, apart) >= reach * reach;
+      const double along = state_.bent ? other.height - c.height : 0;
+      const double reach = k == 0 && has_deepest ? near_deepest : near;
+      alone = dot(apart, apart) + along * along >= reach * reach;
       if (!alone && other.deepest) other.feature = c.feature, other.deepest = false;
     }
     if (alone) shared.chosen[kept++] = c;
@@ -455,10 +518,11 @@ TANDEM_HD void ManifoldMaker<Team>::write_points(const ChoiceMemory& shared, Pat
   for (int i = static_cast<int>(team_.rank()); i < count; i += static_cast<int>(team_.size())) {
     const Chosen& c = shared.chosen[i];
     ManifoldPoint& point = patch.point[i];
-    const Vector3 x = frame.at(c.at, c.height), half = (c.depth / 2) * frame.n;
+    const Vector3 x = frame.at(c.at, c.height), half = state_.bent ? c.half : (c.depth / 2) * c.normal;
     write(x, point.position);
     write(bodies_.a.in_file_coordinates(x + half), point.in_a);
     write(bodies_.b.in_file_coordinates(x - half), point.in_b);
+    write(c.normal, point.normal);
     point.depth = c.depth;
     point.id = c.feature;
     point.face_a = bodies_.a.shape->triangles[c.triangle[0]].source_face();

@@ -255,8 +255,8 @@ void ManifoldQuery::State::finish(const Row& row, const SceneState& scene, const
   const Shape &a = shapes[scene.instances[pair.a].asset], &b = shapes[scene.instances[pair.b].asset];
   const OneThread team;
   const manifold::PointMatcher<OneThread> matcher(team, std::min(a.diagonal, b.diagonal));
-  matcher.match(out.points.data(), out.manifolds.data(), place.first_point, place.points,
-                {manifolds_before.data(), points_before.data(), before->first, before->count});
+  matcher.match(out.points.data(), place.first_point, place.points,
+                {points_before.data(), before->first, before->count});
 }
 
 // Moves the manifolds of a pair that is kept.
@@ -280,7 +280,7 @@ void ManifoldQuery::State::keep(std::uint32_t pair, const SceneState& scene, con
                           point_from = before.first_point + (point_to - place.first_point);
       found.points[point_to] = found_before.points[point_from];
       ManifoldPoint& point = out.points[point_to] = points_before[point_from];
-      motion.move(of_then, found.points[point_to], kept, point);
+      motion.move(found.points[point_to], point);
       point.previous = match ? point_from : kNoIndex;
       point.manifold = to;
       if (k == 0) kept.depth = point.depth;

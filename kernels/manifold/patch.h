@@ -193,21 +193,40 @@ struct Sounding {
 struct Chosen {
   Vector2 at;
   double height, depth, from_middle;
+  Vector3 normal;  ///< from a towards b
+  Vector3 half;    ///< of a bent patch: from the point to a's surface
   std::uint64_t feature;
   std::uint32_t triangle[2];
   bool deepest;  ///< it lies on the deepest line
 };
 
+/// Two surfaces that face each other, as a line across the overlap meets them.
+struct Sheet {
+  Vector3 at;      ///< half-way between them
+  Vector3 normal;  ///< half-way between their normals, from a towards b
+  Vector3 half;    ///< from there to a's
+  double depth;    ///< the way between them along the normal
+  std::uint32_t triangle[2];
+  bool found;
+};
+
 /// The most points of a rim: one is left for the deepest line, unless the surfaces only touch.
 inline constexpr int kMostRimPoints = static_cast<int>(kMostManifoldPoints);
+
+/// The most lines on which a bent patch is looked at: beside the points of the rim, and through the seeds.
+inline constexpr int kMostSheets = kMostRimPoints - 1 + kMostSeeds;
+static_assert(2 * kMostSheets <= LineMemory::kMost);
 
 /// The state of a patch from one step to the next.
 struct PatchState {
   Sounding sounding[kMostRimPoints];
-  OverlapLine deepest;  ///< none where the patch has no depth
-  int rim_points;
+  Sheet sheet[kMostSheets];  ///< of a bent patch
+  OverlapLine deepest;       ///< none where the patch has no depth
+  int rim_points, sheets;
   PatchKind kind;
   bool closed, goes_through;
+  bool bent;      ///< a thin one whose surfaces turn from place to place
+  bool through;   ///< of a bent one: the deepest line leaves the overlap on its way
   bool has_area;  ///< else the surfaces touch in points or along lines
   PatchFrame frame;
   Vector3 area;            ///< CurveMeasure's
@@ -253,9 +272,12 @@ struct OutlineMemory {
   std::uint32_t next;
 };
 
+/// The most points of which a manifold's are chosen.
+inline constexpr int kMostCandidates = kMostRimPoints + 1 + kMostSeeds;
+
 /// The memory that a team shares while it chooses a patch's points.
 struct ChoiceMemory {
-  Chosen candidate[kMostRimPoints + 1], chosen[kMostRimPoints + 1];
+  Chosen candidate[kMostCandidates], chosen[kMostCandidates];
   Patch* patch;
   std::uint32_t count;
 };

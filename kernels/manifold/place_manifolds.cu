@@ -194,8 +194,8 @@ __device__ void write_pair(const ManifoldArgs& args, std::uint32_t row) {
       const manifold::Shape &a = args.shapes[args.instances.asset[bodies.a]],
                             &b = args.shapes[args.instances.asset[bodies.b]];
       const manifold::PointMatcher<WarpTeam> matcher(team, a.diagonal < b.diagonal ? a.diagonal : b.diagonal);
-      matcher.match(args.points, args.manifolds, pair.first_point, pair.points,
-                    {args.manifolds_before, args.points_before, entry.first_point, entry.points});
+      matcher.match(args.points, pair.first_point, pair.points,
+                    {args.points_before, entry.first_point, entry.points});
       return;
     }
     if (++slot == args.table_size) slot = 0;

@@ -90,13 +90,12 @@ int main(int, char** argv) {
     std::swap(touches, before), touches.clear();
     double deepest = 0;
     for (const tandem::ManifoldPoint& p : manifolds.points()) {
-      const tandem::Manifold& m = manifolds.rows()[p.manifold];
-      const auto [i, j] = query.pairs()[m.pair];
+      const auto [i, j] = query.pairs()[manifolds.rows()[p.manifold].pair];
       Body &a = bodies[i], &b = bodies[j];
       for (const std::uint32_t k : {i, j})  // who is hit wakes
         if (motion[k] == Motion::sleeping && norm(bodies[i + j - k].velocity) > 4 * kSlow)
           motion[k] = Motion::moving, bodies[k].by_mass = 1;
-      const Vec n = Vec::of(m.normal), x = Vec::of(p.position);
+      const Vec n = Vec::of(p.normal), x = Vec::of(p.position);
       Touch t = {&a, &b, n, x - Vec::of(poses[i].pose.translation), x - Vec::of(poses[j].pose.translation)};
       t.mass = 1 / (a.yield(t.arm_a, n) + b.yield(t.arm_b, n));
       t.leaving = 0.2 / kStep * std::max(0.0, p.depth - kSlop);

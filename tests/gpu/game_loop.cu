@@ -42,7 +42,7 @@ __global__ void push_bodies(int step, const ObjectPair* pairs, const Manifold* m
   const ManifoldPoint& point = points[i];
   const Manifold& m = manifolds[point.manifold];
   const auto [a, b] = pairs[m.pair];
-  const Vec n = of(m.normal), x = of(point.position);
+  const Vec n = of(point.normal), x = of(point.position);
   const Vec arm_a = x - of(poses[a].translation), arm_b = x - of(poses[b].translation);
   const Vec speed_a = of(moves[a].velocity) + cross(of(moves[a].angular_velocity), arm_a);
   const Vec speed_b = of(moves[b].velocity) + cross(of(moves[b].angular_velocity), arm_b);

@@ -173,8 +173,12 @@ Mesh spring(int corners, int turns, double inner_radius, double outer_radius, do
 }
 
 Mesh cup(int sectors, float radius, float height, float wall) {
-  const std::array<float, 2> profile[] = {
-      {0, 0}, {radius, 0}, {radius, height}, {radius - wall, height}, {radius - wall, wall}, {0, wall}};
+  return revolved(
+      {{0, 0}, {radius, 0}, {radius, height}, {radius - wall, height}, {radius - wall, wall}, {0, wall}},
+      sectors);
+}
+
+Mesh revolved(const std::vector<std::array<float, 2>>& profile, int sectors) {
   Mesh mesh;
   std::vector<std::vector<std::uint32_t>> ring;
   for (const auto& [from_axis, z] : profile) {

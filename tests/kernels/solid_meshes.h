@@ -37,8 +37,12 @@ Mesh ring(int corners, double radius, int tube_corners, double tube_radius);
 /// A flat spring about the z axis: a rectangle that is turned and rises by its pitch with each turn.
 Mesh spring(int corners, int turns, double inner_radius, double outer_radius, double pitch, double height);
 
-/// A cup that stands on z = 0: a profile that is turned about the z axis.
+/// A cup that stands on z = 0.
 Mesh cup(int sectors, float radius, float height, float wall);
+
+/// A profile of (distance from the axis, z) that is turned about the z axis: from the axis, outside first, to
+/// the axis.
+Mesh revolved(const std::vector<std::array<float, 2>>& profile, int sectors);
 
 /// Both meshes in one.
 Mesh joined(const Mesh& a, const Mesh& b);

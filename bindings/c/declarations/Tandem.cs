@@ -247,6 +247,7 @@ public unsafe struct tandem_manifold_point {
   public fixed double position[3];
   public fixed double in_a[3];
   public fixed double in_b[3];
+  public fixed double normal[3];
   public double depth;
   public ulong id;
   public uint face_a;

@@ -437,6 +437,7 @@ pub struct tandem_manifold_point {
     pub position: [f64; 3],
     pub in_a: [f64; 3],
     pub in_b: [f64; 3],
+    pub normal: [f64; 3],
     pub depth: f64,
     pub id: u64,
     pub face_a: u32,

@@ -16,8 +16,8 @@ struct Same_tandem_manifold { using Ours = Manifold; using Theirs = tandem_manif
   TANDEM_SAME(area_vector); TANDEM_SAME(centre); TANDEM_SAME(depth); TANDEM_SAME(pair); TANDEM_SAME(first_point); TANDEM_SAME(point_count);
   TANDEM_SAME(flags); };
 struct Same_tandem_manifold_point { using Ours = ManifoldPoint; using Theirs = tandem_manifold_point; TANDEM_SAME_SIZE(); TANDEM_SAME(position);
-  TANDEM_SAME(in_a); TANDEM_SAME(in_b); TANDEM_SAME(depth); TANDEM_SAME(id); TANDEM_SAME(face_a); TANDEM_SAME(face_b); TANDEM_SAME(previous);
-  TANDEM_SAME(manifold); };
+  TANDEM_SAME(in_a); TANDEM_SAME(in_b); TANDEM_SAME(normal); TANDEM_SAME(depth); TANDEM_SAME(id); TANDEM_SAME(face_a); TANDEM_SAME(face_b);
+  TANDEM_SAME(previous); TANDEM_SAME(manifold); };
 struct Same_tandem_manifold_counters { using Ours = ManifoldCounters; using Theirs = tandem_manifold_counters; TANDEM_SAME_SIZE();
   TANDEM_SAME(contacts); TANDEM_SAME(segments); TANDEM_SAME(manifolds); TANDEM_SAME(points); TANDEM_SAME(open_curves); TANDEM_SAME(ambiguous_touches);
   };

@@ -36,7 +36,8 @@ void copy(const double (&from)[3], double (&to)[3]) {
 // the more, the less deep the second deepest point is, and not at all where that is half as deep.
 void move_to_centre(const tandem_manifold& manifold, std::span<const tandem_manifold_point> points,
                     Touch& touch) {
-  if (!(manifold.depth > 0)) return;
+  const bool is_bent = !std::equal(touch.normal, touch.normal + 3, manifold.normal);
+  if (!(manifold.depth > 0) || is_bent) return;  // between bent surfaces the centre is elsewhere
   double second = 0;
   for (const tandem_manifold_point& point : points.subspan(1)) second = std::max(second, point.depth);
   const double share = std::max(0.0, 1 - 2 * second / manifold.depth);
@@ -82,7 +83,7 @@ void Touches::Scene::find_manifolds(const std::vector<tandem_object_pair>* asked
     const tandem_object_pair pair = pairs(TANDEM_CONTACTS)[manifold.pair];
     for (const tandem_manifold_point& point : of_manifold) {
       Touch touch{.a = pair.a, .b = pair.b, .gap = -point.depth};
-      copy(manifold.normal, touch.normal);
+      copy(point.normal, touch.normal);
       copy(point.position, touch.position);
       if (&point == &of_manifold.front()) move_to_centre(manifold, of_manifold, touch);
       add(manifold.pair, touch);

@@ -17,8 +17,8 @@ CONTACT = np.dtype([("pair", "<u4"), ("triangle_a", "<u4"), ("triangle_b", "<u4"
 MANIFOLD = np.dtype([("normal", "<f8", (3,)), ("area_vector", "<f8", (3,)), ("centre", "<f8", (3,)), ("depth", "<f8"), ("pair", "<u4"),
         ("first_point", "<u4"), ("point_count", "<u4"), ("flags", "<u4")])
 #: A point of a manifold.
-POINT = np.dtype([("position", "<f8", (3,)), ("in_a", "<f8", (3,)), ("in_b", "<f8", (3,)), ("depth", "<f8"), ("id", "<u8"), ("face_a", "<u4"),
-        ("face_b", "<u4"), ("previous", "<u4"), ("manifold", "<u4")])
+POINT = np.dtype([("position", "<f8", (3,)), ("in_a", "<f8", (3,)), ("in_b", "<f8", (3,)), ("normal", "<f8", (3,)), ("depth", "<f8"), ("id", "<u8"),
+        ("face_a", "<u4"), ("face_b", "<u4"), ("previous", "<u4"), ("manifold", "<u4")])
 #: A component of a body that meets nothing of another and lies within it.
 CONTAINMENT = np.dtype([("pair", "<u4"), ("inner", "<u4"), ("component", "<u4"), ("flags", "<u4")])
 #: The distance of the surfaces of two bodies (docs/distance.md).

@@ -43,7 +43,7 @@ class MeshContacts:
 
     The meshes are those of the model, with all their faces; their hulls play no part. What they meet are meshes too: boxes and height fields as they are, planes
     as slabs that reach beyond all that could touch them, and meshes of spheres, capsules, ellipsoids and cylinders whose faces lie between the shape scaled by
-    1 - tolerance and by 1 + tolerance. A pair of geoms has the points of its manifolds, each with the manifold's normal and its depth; the deepest, where it
+    1 - tolerance and by 1 + tolerance. A pair of geoms has the points of its manifolds, each with its normal and depth; the deepest, where it
     alone is deep, acts through the manifold's centre. Where a pair is apart by less than its margin and gap, it has the points that are, found along the way from
     one to the other. Which pairs may collide is MuJoCo's rule (contype and conaffinity,
     weld and parent bodies, <exclude>, <pair>); it, meshes, sizes and height fields are taken from the model when this is made, and the callback

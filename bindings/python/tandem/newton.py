@@ -36,7 +36,7 @@ _NOT_TAKEN = {"broad_phase": "which pairs there are is decided here", "shape_pai
 class CollisionPipeline:
     """Newton's collision pipeline, but that Tandem finds the contacts of meshes with meshes, boxes and round shapes.
 
-    These pairs have the points of their manifolds, each with the manifold's normal and the places of both surfaces along it; the deepest, where it alone is
+    These pairs have the points of their manifolds, each with its normal and the places of both surfaces along it; the deepest, where it alone is
     deep, acts through the manifold's centre. Where shapes have margins and the surfaces are apart by less than both, they have the points that are, found along
     the way from one to the other. Boxes are meshes as they are. So are spheres,
     capsules, ellipsoids, cylinders and cones, with faces between the shape scaled by 1 - tolerance and by 1 + tolerance. Gaps, by which Newton looks for

@@ -180,7 +180,7 @@ TEST(KeptManifolds, ArePlacedByTheirPointsOnBothBodies) {
       for (const ManifoldPoint& p : heap.made.points().subspan(m.first_point, m.point_count)) {
         const Vector3 on_a = apply(a, vector_of(p.in_a)), on_b = apply(b, vector_of(p.in_b));
         EXPECT_LT(distance(vector_of(p.position), 0.5 * (on_a + on_b)), 1e-14);
-        EXPECT_NEAR(p.depth, dot(vector_of(m.normal), on_a - on_b), 1e-14);
+        EXPECT_NEAR(p.depth, dot(vector_of(p.normal), on_a - on_b), 1e-14);
         ASSERT_NE(p.previous, kNoIndex);
         const ManifoldPoint& q = before.points[p.previous];
         EXPECT_EQ(p.id, q.id);

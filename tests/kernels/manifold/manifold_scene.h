@@ -1,6 +1,7 @@
 #pragma once
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <cstring>
 #include <vector>
 
@@ -15,6 +16,12 @@
 namespace tandem::test {
 
 using manifold::Vector3;
+
+inline constexpr double kDegree = 3.14159265358979323846 / 180;
+
+inline double angle_between(const Vector3& p, const Vector3& q) {
+  return std::atan2(norm(cross(p, q)), dot(p, q));
+}
 
 inline Vector3 vector_of(const double (&x)[3]) {
   return {x[0], x[1], x[2]};

@@ -10,12 +10,6 @@ namespace {
 
 using manifold::Vector2;
 
-constexpr double kDegree = 3.14159265358979323846 / 180;
-
-double angle_between(const Vector3& p, const Vector3& q) {
-  return std::atan2(norm(cross(p, q)), dot(p, q));
-}
-
 struct NamedMesh {
   const char* name;
   Mesh mesh;

@@ -20,20 +20,12 @@ struct PlainTeam {
   static void sync() {}
 };
 
-struct PointsOfStep {
-  std::vector<Manifold> manifolds;
-  std::vector<ManifoldPoint> points;
+using Points = std::vector<ManifoldPoint>;
 
-  void add(const ManifoldPoint& point, const Vector3& normal) {
-    if (points.size() % kMostManifoldPoints == 0) {
-      Manifold manifold = {};
-      manifold.normal[0] = normal.x, manifold.normal[1] = normal.y, manifold.normal[2] = normal.z;
-      manifolds.push_back(manifold);
-    }
-    points.push_back(point);
-    points.back().manifold = static_cast<std::uint32_t>(manifolds.size() - 1);
-  }
-};
+void turn_point(test::RandomPoses& random, ManifoldPoint& point) {
+  const bool down = random.below(4) == 0;
+  point.normal[1] = down ? 0 : 0.6, point.normal[2] = down ? -1 : 0.8;
+}
 
 ManifoldPoint point_at(test::RandomPoses& random, bool on_lattice) {
   ManifoldPoint point = {};
@@ -45,6 +37,7 @@ ManifoldPoint point_at(test::RandomPoses& random, bool on_lattice) {
     point.in_b[k] = point.in_a[k] + k;
   }
   point.id = feature_hash(random.below(1000), 1);
+  turn_point(random, point);
   return point;
 }
 
@@ -56,18 +49,13 @@ void move_point(test::RandomPoses& random, double way, ManifoldPoint& point) {
   }
 }
 
-Vector3 some_normal(test::RandomPoses& random) {
-  return random.below(4) == 0 ? Vector3{0, 0, -1} : Vector3{0, 0.6, 0.8};
-}
-
 template <typename Team>
-std::vector<ManifoldPoint> matched(const PointsOfStep& now, const PointsOfStep& before) {
-  std::vector<ManifoldPoint> points = now.points;
+Points matched(const Points& now, const Points& before) {
+  Points points = now;
   const Team team;
   const PointMatcher<Team> matcher(team, 1);
-  matcher.match(points.data(), now.manifolds.data(), 3, static_cast<std::uint32_t>(points.size()) - 3,
-                {before.manifolds.data(), before.points.data(), 2,
-                 static_cast<std::uint32_t>(before.points.size()) - 2});
+  matcher.match(points.data(), 3, static_cast<std::uint32_t>(points.size()) - 3,
+                {before.data(), 2, static_cast<std::uint32_t>(before.size()) - 2});
   return points;
 }
 
@@ -77,18 +65,18 @@ TEST(PointMatcher, OfManyPointsFindsWhatComparingEachWithEachFinds) {
                                    {10, 20000}, {20000, 10}, {8300, 1200}, {1200, 8300}};
   for (const auto& [old, fresh] : counts) {
     for (int kind = 0; kind < 4; ++kind) {
-      PointsOfStep before, now;
-      for (std::size_t i = 0; i < old; ++i) before.add(point_at(random, kind % 2 != 0), some_normal(random));
+      Points before, now;
+      for (std::size_t i = 0; i < old; ++i) before.push_back(point_at(random, kind % 2 != 0));
       for (std::size_t i = 0; i < fresh; ++i) {
-        ManifoldPoint point = random.below(8) == 0 || kind == 3 ? point_at(random, kind % 2 != 0)
-                                                                : before.points[random.below(old)];
+        ManifoldPoint point =
+            random.below(8) == 0 || kind == 3 ? point_at(random, kind % 2 != 0) : before[random.below(old)];
         const double ways[] = {0, 1e-3, 0.02};
         move_point(random, ways[random.below(3)], point);
         point.previous = static_cast<std::uint32_t>(random.below(9));  // what was there does not matter
-        now.add(point, some_normal(random));
+        turn_point(random, point);
+        now.push_back(point);
       }
-      const std::vector<ManifoldPoint> expected = matched<PlainTeam>(now, before),
-                                       found = matched<OneThread>(now, before);
+      const Points expected = matched<PlainTeam>(now, before), found = matched<OneThread>(now, before);
       std::size_t same = 0, different = 0;
       for (std::size_t i = 3; i < fresh; ++i) {
         ASSERT_EQ(found[i].previous, expected[i].previous) << i << " of " << fresh << " kind " << kind;

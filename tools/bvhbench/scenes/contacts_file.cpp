@@ -63,6 +63,7 @@ void add_manifolds(Hdf5Output& file, std::span<const Manifold> manifolds,
   add_column(file, "/manifolds/centre", manifolds, &Manifold::centre);
   file.add("/manifolds/first", {first.size()}, first);
   add_column(file, "/points/position", points, &ManifoldPoint::position);
+  add_column(file, "/points/normal", points, &ManifoldPoint::normal);
   add_column(file, "/points/depth", points, &ManifoldPoint::depth);
   add_column(file, "/points/id", points, &ManifoldPoint::id);
   add_column(file, "/points/face_a", points, &ManifoldPoint::face_a);

@@ -550,7 +550,8 @@ typedef struct tandem_manifold {
 typedef struct tandem_manifold_point {
   double position[3];       ///< world, half-way between the surfaces
   double in_a[3], in_b[3];  ///< on the surface of a, of b, in the coordinates of its mesh file
-  double depth;             ///< along the manifold's normal
+  double normal[3];         ///< unit: the manifold's, or where the patch is bent the surfaces' here
+  double depth;             ///< along the point's normal
   uint64_t id;              ///< never 0; the same in successive steps for what is the same contact
   uint32_t face_a, face_b;  ///< of the mesh files
   uint32_t previous;        ///< the same point among those of the step before, or TANDEM_NO_INDEX

@@ -13,13 +13,16 @@ inline constexpr std::uint32_t kMostManifoldPoints = 7;
 struct ManifoldPoint {
   double position[3];       ///< world, half-way between the surfaces
   double in_a[3], in_b[3];  ///< the point on the surface of a, of b, in the coordinates of its asset's file
-  double depth;             ///< >= 0, lengths along the manifold's normal
-  std::uint64_t id;         ///< never 0; the same in successive steps for what is the same contact
+  double
+      normal[3];  ///< unit, from a towards b: the manifold's, or where the patch is bent the surfaces' here;
+                  ///< of one that goes round an axis it may be at more than 90 degrees to the manifold's
+  double depth;   ///< >= 0, overlap along the point's normal
+  std::uint64_t id;              ///< never 0; the same in successive steps for what is the same contact
   std::uint32_t face_a, face_b;  ///< of the source files, where the point was found
   std::uint32_t previous;        ///< the same point among the points of the step before, or kNoIndex
   std::uint32_t manifold;        ///< that it belongs to
 };
-static_assert(sizeof(ManifoldPoint) == 104);
+static_assert(sizeof(ManifoldPoint) == 128);
 
 /// Says how the surfaces of a manifold meet.
 enum ManifoldFlags : std::uint32_t {
@@ -35,7 +38,8 @@ struct Manifold {
   double normal[3];  ///< unit, from a towards b: moving b along it separates the bodies; or 0 (kAmbiguous)
   double area_vector[3];  ///< of a's surface inside b, bounded by the curve in which the surfaces cross
   double centre[3];       ///< of that area, in the world
-  double depth;           ///< how far b is to be moved along the normal to end the overlap; the first point's
+  double depth;           ///< how far b is to be moved along the normal to end the overlap; that of the first
+                          ///< point, so along its normal where the patch is bent
   std::uint32_t pair;     ///< row of the list of object pairs
   std::uint32_t first_point, point_count;
   std::uint32_t flags;  ///< ManifoldFlags

@@ -1,18 +1,18 @@
 #pragma once
 #include "kernels/manifold/patch.h"
 
-/// A thin overlap of surfaces that fit each other and are bent, as of a nut on a bolt, has no one normal. It is
-/// looked at across: lines along the surfaces' own normals say where these face each other.
+/// A thin overlap of surfaces that fit each other and are bent, as of a nut on a bolt, has no one normal. It
+/// is looked at across: lines along the surfaces' own normals say where these face each other.
 namespace tandem::manifold {
 
 /// Two surfaces face each other if the cosine of the angle between a's normal and the reverse of b's is more
 /// than this.
 inline constexpr double kFacing = 0.9;
 
-/// A patch may be bent if, somewhere at its rim, the mean of both surfaces' normals leans from its own by more
-/// than some 6 degrees (this is the square of the sine), and by more than twice the angle between them: a ball
-/// in a bowl that it fits, not one on a floor or on another ball. Sheets that lean more than the cosine below
-/// says, such as plates whose edges overlap, do not make it so.
+/// A patch may be bent if, somewhere at its rim, the mean of both surfaces' normals leans from its own by
+/// more than some 6 degrees (this is the square of the sine), and by more than twice the angle between them:
+/// a ball in a bowl that it fits, not one on a floor or on another ball. Sheets that lean more than the
+/// cosine below says, such as plates whose edges overlap, do not make it so.
 inline constexpr double kBent = 0.01, kLeastBent = 0.2;
 
 /// Surfaces bound a thin overlap if their distance is at most this part of the patch's reach.
@@ -38,7 +38,8 @@ TANDEM_HD_CALLED inline double find_sheet(const BodyPair& bodies, const std::uin
 template <typename Team>
 class SheetFinder {
  public:
-  TANDEM_HD SheetFinder(const Team& team, const BodyPair& bodies, const PieceMemory& memory, PatchState& state)
+  TANDEM_HD SheetFinder(const Team& team, const BodyPair& bodies, const PieceMemory& memory,
+                        PatchState& state)
       : team_(team), bodies_(bodies), memory_(memory), state_(state) {}
 
   /// Condition: the rim has been sounded. seeds: points of the overlap.
@@ -149,7 +150,8 @@ TANDEM_HD_CALLED void SheetFinder<Team>::look_across(const Seeds& seeds, LineMem
     for (int i = rank(); i < count; i += size()) {
       const bool at_rim = i < rim;
       ask_across(i, round, at_rim ? lines.inside[i] : seeds.at[i - rim],
-                 at_rim ? piece_at_rim(i) : seeds.beside[i - rim], !at_rim || (beside_rim >> i & 1u) != 0, lines);
+                 at_rim ? piece_at_rim(i) : seeds.beside[i - rim], !at_rim || (beside_rim >> i & 1u) != 0,
+                 lines);
     }
     team_.sync();
     walk_lines(team_, questions, 2 * static_cast<std::uint32_t>(count));

@@ -34,8 +34,8 @@ struct JointMemory {
   double position = 0;  ///< angle, way or distance; an angle counts whole turns
 };
 
-/// Where the parts of a joint are, in the world. Rows made of the mean of two of these do no work on bodies
-/// that went from the one to the other, and keep their angular momentum.
+/// The places and directions of a joint's parts, in the world. Rows made of the mean of two of these do no
+/// work on bodies that went from the one to the other, and keep their angular momentum.
 struct JointGeometry {
   Vector3 arm_a, arm_b;         ///< from the centres of mass to the anchors
   Vector3 apart;                ///< from a's anchor to b's

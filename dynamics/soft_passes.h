@@ -89,7 +89,7 @@ TANDEM_INLINE void scatter(const MotionOf<Lanes4>& from, SoftMotion* of, const s
   }
 }
 
-// Of four motions the x, y, z of centres in the low half, and of spins in the high one.
+// Turns four motions into their x, y and z: those of centres in the low half, those of spins in the high one.
 TANDEM_INLINE void transpose_halves(Lanes<8> (&rows)[4]) {
   const auto low01 = __builtin_shufflevector(rows[0].v, rows[1].v, 0, 8, 1, 9, 4, 12, 5, 13);
   const auto high01 = __builtin_shufflevector(rows[0].v, rows[1].v, 2, 10, 3, 11, 6, 14, 7, 15);
@@ -215,7 +215,7 @@ class PairVisit {
       visit(i, larger(none, take(normal(i).followed) * inverse_h), one, none);
   }
 
-  // Where nothing pushes, and friction was 0, it stays so.
+  // Friction that was 0 stays 0 while nothing pushes.
   TANDEM_INLINE void rub() {
     const L none{};
     L all{};

@@ -92,7 +92,7 @@ struct RandomRows {
         clear_empty_lanes(frictions[i], pairs[g].pairs);
       }
     }
-    // Where nothing pushes, and a pair has no such contact.
+    // Some contacts push nothing, and some pairs have none in a row.
     for (std::size_t i = 0; i < normals.size(); i += 2)
       normals[i].impulse = {}, frictions[i].first_impulse = {};
     for (std::size_t i = 0; i < normals.size(); i += 5) normals[i] = {}, frictions[i] = {};

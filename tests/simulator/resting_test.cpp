@@ -192,7 +192,8 @@ TEST_P(EverySolver, ALastingForceMovesABlockAgainstFriction) {
   }
 }
 
-// As in a world without gravity whose bodies are as heavy by forces: nothing depends on gravity alone.
+// A world without gravity whose bodies are as heavy by forces moves like one with it: nothing depends on
+// gravity alone.
 TEST_P(EverySolver, ForcesActAsGravityDoes) {
   Vector3 ends[2], speeds[2];
   for (const bool by_force : {false, true}) {

@@ -64,10 +64,11 @@ struct ConvexGoal {
 ///
 /// least. The impulse of a joint's row is l_j + (low - w_j)/R_j where that is more than 0, l_j + (high -
 /// w_j)/R_j where that is less, and 0 between; low = high of what is held. w: velocities of a contact, of a
-/// pair's turning, and of a joint's row; R: `softness` times what an impulse of 1 changes them by; H: half the
-/// square up to the bound, linear from there on (Huber), so that neither friction nor what resists turning
-/// depends on the impulse along the normal. The impulses are the derivatives. Where y is to be near to others,
-/// what that adds is of no moment once it is there. Newton's method on sparse LDL^T, with exact line search.
+/// pair's turning, and of a joint's row; R: `softness` times what an impulse of 1 changes them by; H: half
+/// the square up to the bound, linear from there on (Huber), so that neither friction nor what resists
+/// turning depends on the impulse along the normal. The impulses are the derivatives. Where y is to be near
+/// to others, what that adds is of no moment once it is there. Newton's method on sparse LDL^T, with exact
+/// line search.
 class ConvexContacts {
  public:
   explicit ConvexContacts(const IslandProblem& problem)

@@ -3,8 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include "kernels/common/stopwatch.h"
 
 namespace tandem::dynamics {
+static std::size_t nasked;
 namespace {
 
 // Bodies are stopped before they meet if the gap is at most this part of the smaller one's radius: where two
@@ -45,7 +49,7 @@ void ContactsAhead::find_near(const BodiesAhead& of) {
     while (before != apart_.end() && before->pair < pair) ++before;
     Apart& now = now_apart_.emplace_back(Apart{pair});
     if (before != apart_.end() && before->pair == pair)
-      now.distance = before->distance - (way_[pair.a] + way_[pair.b]) * (1 + 1e-9);
+      now.distance = before->distance - way_between(pair) * (1 + 1e-9);
     const double way = of.dt * (norm(approach_of(pair, of.states)) + turning_of(pair));
     const double margin = of.fall(pair) + of.overlap();
     now.reach =
@@ -61,10 +65,10 @@ void ContactsAhead::find_near(const BodiesAhead& of) {
 
 void ContactsAhead::add_to(std::vector<ContactPoint>& found, std::span<const ObjectPair> kept,
                            const BodiesAhead& of) {
-  find_distances(found, kept, of.overlap());
+  Stopwatch sw; find_distances(found, kept, of.overlap()); double t1=sw.lap();
   find_approaches(of);
   if (approaches_.empty()) return;
-  find_points(of);
+  find_points(of);double t2=sw.lap(); if(getenv("DBG"))std::fprintf(stderr,"near %zu slow %zu fast %zu dist asked %zu within %zu approaches %zu points %zu | dist %.1f points %.1f ms\n",apart_.size(),slow_.size(),fast_.size(),nasked,asked_.size(),approaches_.size(),points_.size(),1e3*t1,1e3*t2);
   const auto middle = static_cast<std::ptrdiff_t>(found.size());
   found.insert(found.end(), points_.begin(), points_.end());
   std::inplace_merge(found.begin(), found.begin() + middle, found.end(), comes_before);
@@ -87,10 +91,10 @@ void ContactsAhead::place(const BodiesAhead& of) {
 void ContactsAhead::follow(const BodiesAhead& of) {
   const std::span<const BodyState> states = of.states;
   if (before_.size() != states.size()) apart_.clear(), before_.assign(states.begin(), states.end());
-  way_.resize(states.size());
+  way_.resize(states.size()), turn_.resize(states.size());
   for (std::size_t i = 0; i < states.size(); ++i) {
-    const double turn = norm(turn_between(before_[i].orientation, states[i].orientation));
-    way_[i] = norm(states[i].position - before_[i].position) + of.bodies[i].radius * turn;
+    turn_[i] = of.bodies[i].radius * norm(turn_between(before_[i].orientation, states[i].orientation));
+    way_[i] = states[i].position - before_[i].position;
     before_[i] = states[i];
   }
 }
@@ -133,7 +137,7 @@ void ContactsAhead::find_distances(std::span<const ContactPoint> found, std::spa
     const int exponent = std::max(std::ilogb(apart.reach / overlap), 0);
     of_reach[static_cast<std::size_t>(std::min(exponent, kClasses - 1))].push_back(i);
   }
-  asked_.clear();
+  asked_.clear(); nasked=0;for(auto&p:of_reach)nasked+=p.size();
   for (const std::vector<std::uint32_t>& places : of_reach) {
     if (places.empty()) continue;
     pairs_.clear();

@@ -54,6 +54,10 @@ class ContactsAhead {
   void place(const BodiesAhead& of);
   void follow(const BodiesAhead& of);
   bool is_still(std::uint32_t body) const { return motion_[body] == Motion::fixed; }
+  /// How far points of one body have moved as seen from the other since the last call, at most.
+  double way_between(const ObjectPair& pair) const {
+    return norm(way_[pair.b] - way_[pair.a]) + turn_[pair.a] + turn_[pair.b];
+  }
   double turning_of(const ObjectPair& pair) const { return turning_[pair.a] + turning_[pair.b]; }
   Vector3 approach_of(const ObjectPair& pair, std::span<const BodyState> states) const;
   double farthest(const BodiesAhead& of) const;
@@ -68,7 +72,8 @@ class ContactsAhead {
   ManifoldQuery manifolds_;
 
   std::vector<BodyState> before_;  // of the last call
-  std::vector<double> way_;        // that points of each body have moved since then, at most
+  std::vector<Vector3> way_;       // of each body's centre since then
+  std::vector<double> turn_;       // how far points of each body have moved about its centre, at most
   std::vector<Apart> apart_, now_apart_;
   std::vector<ObjectPair> slow_, fast_;
   std::vector<Motion> motion_;

@@ -8,7 +8,7 @@
 #include "kernels/common/stopwatch.h"
 
 namespace tandem::dynamics {
-static std::size_t nasked;
+static std::size_t nasked; static const double RF=getenv("RF")?atof(getenv("RF")):2,RT=getenv("RT")?atof(getenv("RT")):0.05;
 namespace {
 
 // Bodies are stopped before they meet if the gap is at most this part of the smaller one's radius: where two
@@ -144,7 +144,7 @@ void ContactsAhead::find_distances(std::span<const ContactPoint> found, std::spa
     double reach = 0;
     for (const std::uint32_t i : places)
       pairs_.push_back(apart_[i].pair), reach = std::max(reach, apart_[i].reach);
-    const DistanceOptions options = {.tolerance = {kExact * overlap, 0.05}, .reach = 2 * reach};
+    const DistanceOptions options = {.tolerance = {kExact * overlap, RT}, .reach = RF * reach};
     require(distances_.find(scene_, pairs_, options), scene_);
     for (std::size_t i = 0; i < places.size(); ++i) {
       const ObjectDistance& distance = distances_.rows()[i];

@@ -3,12 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
-#include <cstdlib>
-#include "kernels/common/stopwatch.h"
 
 namespace tandem::dynamics {
-static std::size_t nasked; static const double RF=getenv("RF")?atof(getenv("RF")):2,RT=getenv("RT")?atof(getenv("RT")):0.05;
 namespace {
 
 // Bodies are stopped before they meet if the gap is at most this part of the smaller one's radius: where two
@@ -52,12 +48,14 @@ void ContactsAhead::find_near(const BodiesAhead& of) {
       now.distance = before->distance - way_between(pair) * (1 + 1e-9);
     const double way = of.dt * (norm(approach_of(pair, of.states)) + turning_of(pair));
     const double margin = of.fall(pair) + of.overlap();
-    now.reach =
-        std::min(way + margin, kFarthest * std::min(of.bodies[pair.a].radius, of.bodies[pair.b].radius));
+    const double rounding = rounding_of(of, pair);
+    const double farthest = kFarthest * std::min(of.bodies[pair.a].radius, of.bodies[pair.b].radius);
+    now.reach = std::max(std::min(way + margin, farthest), rounding);
     now.slow = way <= of.slop;
+    if (now.distance > now.reach) continue;
     if (now.slow)
       slow_.push_back(pair);
-    else if (!(now.distance > rounding_of(of, pair)))
+    else if (!(now.distance > rounding))
       fast_.push_back(pair);
   }
   apart_.swap(now_apart_);
@@ -65,13 +63,27 @@ void ContactsAhead::find_near(const BodiesAhead& of) {
 
 void ContactsAhead::add_to(std::vector<ContactPoint>& found, std::span<const ObjectPair> kept,
                            const BodiesAhead& of) {
-  Stopwatch sw; find_distances(found, kept, of.overlap()); double t1=sw.lap();
+  find_distances(found, kept, of.overlap());
   find_approaches(of);
   if (approaches_.empty()) return;
-  find_points(of);double t2=sw.lap(); if(getenv("DBG"))std::fprintf(stderr,"near %zu slow %zu fast %zu dist asked %zu within %zu approaches %zu points %zu | dist %.1f points %.1f ms\n",apart_.size(),slow_.size(),fast_.size(),nasked,asked_.size(),approaches_.size(),points_.size(),1e3*t1,1e3*t2);
+  find_points(of);
   const auto middle = static_cast<std::ptrdiff_t>(found.size());
   found.insert(found.end(), points_.begin(), points_.end());
   std::inplace_merge(found.begin(), found.begin() + middle, found.end(), comes_before);
+}
+
+AheadState ContactsAhead::save() const {
+  AheadState state = {before_, {}};
+  for (const Apart& apart : apart_) {
+    if (apart.distance > 0) state.apart.push_back({apart.pair, apart.distance});
+  }
+  return state;
+}
+
+void ContactsAhead::restore(AheadState state) {
+  before_ = std::move(state.before);
+  apart_.clear();
+  for (const PairApart& apart : state.apart) apart_.push_back({apart});
 }
 
 void ContactsAhead::place(const BodiesAhead& of) {
@@ -137,14 +149,14 @@ void ContactsAhead::find_distances(std::span<const ContactPoint> found, std::spa
     const int exponent = std::max(std::ilogb(apart.reach / overlap), 0);
     of_reach[static_cast<std::size_t>(std::min(exponent, kClasses - 1))].push_back(i);
   }
-  asked_.clear(); nasked=0;for(auto&p:of_reach)nasked+=p.size();
+  asked_.clear();
   for (const std::vector<std::uint32_t>& places : of_reach) {
     if (places.empty()) continue;
     pairs_.clear();
     double reach = 0;
     for (const std::uint32_t i : places)
       pairs_.push_back(apart_[i].pair), reach = std::max(reach, apart_[i].reach);
-    const DistanceOptions options = {.tolerance = {kExact * overlap, RT}, .reach = RF * reach};
+    const DistanceOptions options = {.tolerance = {kExact * overlap, 0.05}, .reach = 2 * reach};
     require(distances_.find(scene_, pairs_, options), scene_);
     for (std::size_t i = 0; i < places.size(); ++i) {
       const ObjectDistance& distance = distances_.rows()[i];

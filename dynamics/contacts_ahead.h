@@ -8,6 +8,18 @@
 
 namespace tandem::dynamics {
 
+/// A pair of bodies, and how far apart they are at least.
+struct PairApart {
+  ObjectPair pair;
+  double distance = 0;
+};
+
+/// What is known of distances: where bodies stood then, and the pairs that were apart, ascending.
+struct AheadState {
+  std::vector<BodyState> before;
+  std::vector<PairApart> apart;
+};
+
 /// Finds contacts of bodies that do not touch yet but may within the step, with their gaps, so that the
 /// solver stops them where they meet, and not a step later and deep in each other.
 ///
@@ -23,7 +35,7 @@ class ContactsAhead {
   /// Finds which bodies are near each other. Throws QueryFailed.
   void find_near(const BodiesAhead& of);
 
-  /// Return the pairs that are near each other, ascending, until the next find_near(). Slow: points move
+  /// Return the pairs that may meet within the step, ascending, until the next find_near(). Slow: points move
   /// against each other by no more than the slop in this step, so that a pair keeps what was found of it
   /// until it has moved by more than that. Fast: the others, but for those that surely do not touch.
   std::span<const ObjectPair> slow() const { return slow_; }
@@ -34,11 +46,12 @@ class ContactsAhead {
   /// nothing but the arguments. Condition: find_near() was called for the same bodies. Throws QueryFailed.
   void add_to(std::vector<ContactPoint>& found, std::span<const ObjectPair> kept, const BodiesAhead& of);
 
+  /// Return what the next call takes distances from, and let it go on from there.
+  AheadState save() const;
+  void restore(AheadState state);
+
  private:
-  /// A pair, and how far apart its bodies are at least.
-  struct Apart {
-    ObjectPair pair;
-    double distance = 0;
+  struct Apart : PairApart {
     double reach = 0;  ///< how far apart they may be and meet within the step
     bool slow = false;
   };

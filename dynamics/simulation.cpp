@@ -194,6 +194,7 @@ SimulationState Simulation::save() const {
           states_,
           {entries.begin(), entries.end()},
           {posed.begin(), posed.end()},
+          parts_.ahead ? parts_.ahead->save() : AheadState{},
           {quiet.begin(), quiet.end()},
           {groups.begin(), groups.end()},
           forces_,
@@ -207,6 +208,7 @@ void Simulation::restore(SimulationState state) {
   states_ = std::move(state.states);
   cache_.restore(std::move(state.contacts));
   parts_.contacts->resume(state.posed);
+  if (parts_.ahead) parts_.ahead->restore(std::move(state.ahead));
   sleep_.restore(std::move(state.quiet), std::move(state.groups));
   forces_ = std::move(state.forces);
   touches_.restore(std::move(state.touching));

@@ -49,6 +49,7 @@ struct SimulationState {
   std::vector<BodyState> states;
   std::vector<CachedContact> contacts;
   std::vector<PosedBodies> posed;     ///< of the contact finder
+  AheadState ahead;                   ///< empty: no contacts ahead are looked for
   std::vector<double> quiet;          ///< of Sleep
   std::vector<std::uint32_t> groups;  ///< of Sleep
   std::vector<BodyForce> forces;      ///< empty: there are none

@@ -14,6 +14,9 @@
 namespace tandem {
 namespace {
 
+// Near pairs that a thread looks at at a time.
+constexpr std::size_t kPairsAtOnce = 4096;
+
 // Bodies that a worker poses at a time: some microseconds of work.
 constexpr std::size_t kBodiesAtOnce = 64;
 
@@ -102,6 +105,7 @@ void SceneState::forget_bodies() {
   mask.clear();
   excluded = {};
   found_of_.valid = fixed_kept_ = false;
+  near_.forget();
   broad_phase_.forget_fixed();
 }
 
@@ -198,6 +202,7 @@ Status SceneState::set_filter(const PairFilter& filter) {
   const bool other_excluded = excluded.slots != nullptr || filter.excluded.slots != nullptr;
   excluded = filter.excluded;
   if (other_motion) fixed_kept_ = false;
+  if (other_motion || other_group || other_mask) near_.forget();
   if (other_motion || other_group || other_mask || other_excluded) found_of_.valid = false;
   const bool all_there = (filter.motion == nullptr || motion.size() == instances.size()) &&
                          (filter.group == nullptr || group.size() == instances.size()) &&
@@ -245,6 +250,7 @@ Status SceneState::add(const Instance& instance, const BodyFilter& filter, std::
     return shrink(Status::kOutOfMemory);
   if (const Status status = pose(free, instance); status != Status::kOk) return shrink(status);
   removed_ -= count == before;
+  near_.forget();
   note_change(free);
   if (count > before && reach_boxes_.size() == before && !reach_boxes_.push(kNowhere))
     found_of_.valid = false;
@@ -275,6 +281,7 @@ Status SceneState::set_motion(std::uint32_t body, Motion what) {
   if (!add_entry(what, Motion::moving, motion, body, instances.size())) return fail(Status::kOutOfMemory, 0);
   ++version;
   found_of_.valid = fixed_kept_ = false;
+  near_.forget();
   return Status::kOk;
 }
 
@@ -377,6 +384,54 @@ Status SceneState::search_by_device() {
   return status;
 }
 
+// Whether the near pairs have all that meet; they are found anew where that pays. A caller may change the
+// excluded pairs in their place, so near ones may be excluded.
+bool SceneState::near_pairs_hold(std::uint32_t workers) {
+  if (found_of_.self_pairs || removed_ != 0) return false;
+  if (near_.hold(asked_boxes())) return true;
+  if (!near_.are_due()) return false;
+  const auto is_fixed = [&](std::uint32_t i) { return motion.size() != 0 && motion[i] == Motion::fixed; };
+  PairFilter all = filter();
+  all.excluded = {};
+  const bool found =
+      near_.widen(asked_boxes(), is_fixed) &&
+      broad_phase_.find_pairs(near_.boxes(), all, false, threads, workers) == Status::kOk &&
+      near_.take(broad_phase_.pairs());
+  if (!found) near_.forget();
+  return found;
+}
+
+// Finds those of the near pairs that meet, a part at a time.
+Status SceneState::take_near_pairs() {
+  const std::span<const ObjectPair> near = near_.pairs();
+  const std::span<const WorldBox> of = asked_boxes();
+  const std::size_t parts = (near.size() + kPairsAtOnce - 1) / kPairsAtOnce;
+  const std::uint32_t workers = workers_for(parts, 1);
+  if (!found_.resize(near.size()) || !meeting_.resize(parts))
+    return Status::kOutOfMemory;
+  if (!threads.provide(workers)) return Status::kCannotStartThread;
+  ObjectPair* const found = found_.data();
+  threads.for_parts(workers, parts, 1, [&](std::size_t part, std::size_t last, std::uint32_t) {
+    for (; part < last; ++part) {
+      const std::size_t begin = part * kPairsAtOnce, end = std::min(begin + kPairsAtOnce, near.size());
+      std::size_t next = begin;
+      for (std::size_t i = begin; i < end; ++i) {
+        const ObjectPair pair = near[i];
+        found[next] = pair;
+        next += overlap(of[pair.a], of[pair.b]) && !excluded.contains(pair.a, pair.b);
+      }
+      meeting_[part] = static_cast<std::uint32_t>(next - begin);
+    }
+  });
+  std::size_t count = 0;
+  for (std::size_t part = 0; part < parts; ++part) {
+    const ObjectPair* const first = found + part * kPairsAtOnce;
+    std::copy(first, first + meeting_[part], found + count);
+    count += meeting_[part];
+  }
+  return found_.resize(count) ? Status::kOk : Status::kOutOfMemory;
+}
+
 // A removed body may still be a pair: with itself, which is not asked of its box, or where reach is infinite.
 Status SceneState::search_all() {
   if (device != nullptr) return search_by_device();
@@ -384,8 +439,9 @@ Status SceneState::search_all() {
   if (!widen_boxes()) return Status::kOutOfMemory;
   const std::uint32_t workers = workers_for(broad_phase_.free_count(boxes.size()), kBodiesAtOnce);
   if (!threads.provide(workers)) return Status::kCannotStartThread;
-  const Status status = broad_phase_.find_pairs((found_of_.reach > 0 ? reach_boxes_ : boxes).view(), filter(),
-                                                found_of_.self_pairs, threads, workers);
+  if (near_pairs_hold(workers)) return take_near_pairs();
+  const Status status =
+      broad_phase_.find_pairs(asked_boxes(), filter(), found_of_.self_pairs, threads, workers);
   if (status != Status::kOk) return status;
   const std::span<const ObjectPair> all = broad_phase_.pairs();
   if (!found_.resize(all.size())) return Status::kOutOfMemory;

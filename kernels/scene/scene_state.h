@@ -9,6 +9,7 @@
 #include "kernels/common/worker_threads.h"
 #include "kernels/geometry/relative_pose.h"
 #include "kernels/scene/scene_device.h"
+#include "kernels/scene/near_pairs.h"
 #include "tandem/kernels/broad_phase.h"
 #include "tandem/kernels/detail/buffer.h"
 #include "tandem/kernels/scene.h"
@@ -146,12 +147,19 @@ struct SceneState : Allocated {
   Status find_pairs(double reach, bool self_pairs);
   Status keep_fixed_bodies();
   Status search_all();
+  std::span<const WorldBox> asked_boxes() const {
+    return (found_of_.reach > 0 ? reach_boxes_ : boxes).view();
+  }
+  bool near_pairs_hold(std::uint32_t workers);
+  Status take_near_pairs();
   Status search_by_device();
   Status search_changed();
   WorldBox box_within_reach(std::uint32_t body) const;
   bool widen_boxes();
 
   BroadPhase broad_phase_;
+  NearPairs near_;  // of the motions, groups and masks that there are now
+  Buffer<std::uint32_t> meeting_;  // how many of each part of the near pairs meet
   Buffer<WorldBox> reach_boxes_;  // larger, so that those within reach meet
   Buffer<ObjectPair> found_, fresh_;
   FoundPairs found_of_;

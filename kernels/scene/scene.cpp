@@ -393,10 +393,9 @@ bool SceneState::near_pairs_hold(std::uint32_t workers) {
   const auto is_fixed = [&](std::uint32_t i) { return motion.size() != 0 && motion[i] == Motion::fixed; };
   PairFilter all = filter();
   all.excluded = {};
-  const bool found =
-      near_.widen(asked_boxes(), is_fixed) &&
-      broad_phase_.find_pairs(near_.boxes(), all, false, threads, workers) == Status::kOk &&
-      near_.take(broad_phase_.pairs());
+  const bool found = near_.widen(asked_boxes(), is_fixed) &&
+                     broad_phase_.find_pairs(near_.boxes(), all, false, threads, workers) == Status::kOk &&
+                     near_.take(broad_phase_.pairs());
   if (!found) near_.forget();
   return found;
 }
@@ -407,8 +406,7 @@ Status SceneState::take_near_pairs() {
   const std::span<const WorldBox> of = asked_boxes();
   const std::size_t parts = (near.size() + kPairsAtOnce - 1) / kPairsAtOnce;
   const std::uint32_t workers = workers_for(parts, 1);
-  if (!found_.resize(near.size()) || !meeting_.resize(parts))
-    return Status::kOutOfMemory;
+  if (!found_.resize(near.size()) || !meeting_.resize(parts)) return Status::kOutOfMemory;
   if (!threads.provide(workers)) return Status::kCannotStartThread;
   ObjectPair* const found = found_.data();
   threads.for_parts(workers, parts, 1, [&](std::size_t part, std::size_t last, std::uint32_t) {

@@ -8,8 +8,8 @@
 
 #include "kernels/common/worker_threads.h"
 #include "kernels/geometry/relative_pose.h"
-#include "kernels/scene/scene_device.h"
 #include "kernels/scene/near_pairs.h"
+#include "kernels/scene/scene_device.h"
 #include "tandem/kernels/broad_phase.h"
 #include "tandem/kernels/detail/buffer.h"
 #include "tandem/kernels/scene.h"
@@ -158,9 +158,9 @@ struct SceneState : Allocated {
   bool widen_boxes();
 
   BroadPhase broad_phase_;
-  NearPairs near_;  // of the motions, groups and masks that there are now
+  NearPairs near_;                 // of the motions, groups and masks that there are now
   Buffer<std::uint32_t> meeting_;  // how many of each part of the near pairs meet
-  Buffer<WorldBox> reach_boxes_;  // larger, so that those within reach meet
+  Buffer<WorldBox> reach_boxes_;   // larger, so that those within reach meet
   Buffer<ObjectPair> found_, fresh_;
   FoundPairs found_of_;
   Buffer<std::uint8_t> changed_;  // of each body: since pairs were found

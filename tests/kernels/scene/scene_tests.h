@@ -170,6 +170,22 @@ class ChangingScene {
     }
   }
 
+  /// Places the bodies with another filter of one.
+  void place_with_other_filter() {
+    filters_[random_.below(bodies_.size())] = any_filter();
+    place();
+  }
+
+  /// Moves all bodies that are not fixed by up to so much along each axis, each always the same way.
+  void drift(double most) {
+    RandomPoses way(bodies_.size());
+    for (std::uint32_t i = 0; i < bodies_.size(); ++i) {
+      if (bodies_[i].asset == kNoIndex || filters_[i].motion == Motion::fixed) continue;
+      for (double& x : bodies_[i].pose.translation) x += way.symmetric(most);
+      ASSERT_EQ(scene_.move(i, bodies_[i].pose), Status::kOk);
+    }
+  }
+
   /// Expects what a scene finds that is made anew of the bodies, whose numbers are their places among them.
   void expect_same(double reach, bool self_pairs) {
     std::vector<Instance> bodies;
@@ -278,6 +294,27 @@ TYPED_TEST_P(SceneOn, FindsThePairsOfItsBodiesWhateverChanged) {
   EXPECT_GT(found, 10'000u);
 }
 
+/// Pairs that were near serve for the next searches, until a body leaves its larger box.
+TYPED_TEST_P(SceneOn, FindsThePairsOfBodiesThatHardlyMove) {
+  std::size_t found = 0;
+  for (std::uint64_t seed = 0; seed < 6; ++seed) {
+    ChangingScene<TypeParam> changing(200 + seed, 60);
+    EXPECT_EQ(changing.scene().set_threads(seed % 3 == 1 ? 3 : 1), Status::kOk);
+    RandomPoses random(300 + seed);
+    double reach = 0;
+    for (int step = 0; step < 80 && !testing::Test::HasFailure(); ++step) {
+      SCOPED_TRACE(testing::Message() << "seed " << seed << ", step " << step);
+      changing.drift(random.below(20) == 0 ? 0.3 : random.below(2) == 0 ? 0.01 : 0.001);
+      if (random.below(32) == 0) changing.change(), changing.place();
+      if (random.below(32) == 0) changing.place_with_other_filter();
+      if (random.below(8) == 0) reach = random.uniform(0, 0.05);
+      changing.expect_same(reach, random.below(20) == 0);
+    }
+    found += changing.found();
+  }
+  EXPECT_GT(found, 10'000u);
+}
+
 TYPED_TEST_P(SceneOn, RefusesListsOfDifferentLengths) {
   const BodyScene cubes = row_of_cubes(4);
   TypeParam scene;
@@ -351,7 +388,8 @@ TYPED_TEST_P(SceneOn, AnswersOfNoBodiesAreEmpty) {
   }
 }
 
-REGISTER_TYPED_TEST_SUITE_P(SceneOn, FindsThePairsOfItsBodiesWhateverChanged, RefusesListsOfDifferentLengths,
+REGISTER_TYPED_TEST_SUITE_P(SceneOn, FindsThePairsOfItsBodiesWhateverChanged,
+                            FindsThePairsOfBodiesThatHardlyMove, RefusesListsOfDifferentLengths,
                             AnswersManyQuestionsAboutTheSameBodies, AnswersOfNoBodiesAreEmpty);
 
 }  // namespace tandem

@@ -59,30 +59,66 @@ Vector3 RowMaker::spin_driven(std::uint32_t body) const {
   return states_[body].angular_velocity;
 }
 
+// The velocity of a body's point.
+Vector3 RowMaker::velocity_at(std::uint32_t body, const Vector3& arm) const {
+  if (input_.bodies[body].motion == Motion::fixed) return Vector3{};
+  return states_[body].velocity + cross(states_[body].angular_velocity, arm);
+}
+
+// How gravity and lasting forces accelerate it.
+Vector3 RowMaker::pull_at(std::uint32_t body, const Vector3& arm) const {
+  if (!is_moved(body)) return Vector3{};
+  return input_.pulls[body].linear + cross(input_.pulls[body].angular, arm);
+}
+
+double RowMaker::rebound_of(const ContactPoint& contact, const ContactMeeting& meeting,
+                            const Material& material) const {
+  constexpr double kBouncesAbove = 2;  // times what gravity and forces give in a step
+  if (!(material.restitution > 0)) return 0;
+  const double approach = -dot(contact.normal, meeting.velocity);
+  const double fall =
+      -dot(contact.normal, pull_at(contact.body_b, meeting.arm_b) - pull_at(contact.body_a, meeting.arm_a));
+  const double gap = std::max(0.0, -contact.depth);
+  const bool meets = gap < input_.dt * (approach + 0.5 * input_.dt * fall) || gap == 0;
+  if (!meets || !(approach > kBouncesAbove * input_.dt * input_.pull_of(contact))) return 0;
+  const double square_at_impact = approach * approach + 2 * fall * gap;
+  return material.restitution * std::sqrt(std::max(0.0, square_at_impact));
+}
+
+ContactMeeting RowMaker::meeting(const ContactPoint& contact, const ContactPoint& deepest,
+                                 const Material& material) const {
+  ContactMeeting out;
+  out.arm_a = contact.position - states_[contact.body_a].position;
+  out.arm_b = contact.position - states_[contact.body_b].position;
+  out.velocity = velocity_at(contact.body_b, out.arm_b) - velocity_at(contact.body_a, out.arm_a);
+  out.separation = separation_of(contact, deepest);
+  out.rebound = rebound_of(contact, out, material);
+  return out;
+}
+
 ContactRows RowMaker::rows(const ContactPoint& contact, const ContactPoint& deepest, const SteppedBody& a,
                            const SteppedBody& b, const Material& material,
                            const ContactImpulse& impulse) const {
-  constexpr double kBouncesAbove = 2;  // times what gravity and forces give in a step
-  const Vector3& normal = contact.normal;
-  const auto [first, second] = Tangents(normal);
-  const Vector3 arm_a = contact.position - states_[contact.body_a].position,
-                arm_b = contact.position - states_[contact.body_b].position;
+  const auto [first, second] = Tangents(contact.normal);
+  const ContactMeeting meets = meeting(contact, deepest, material);
   const auto row = [&](const Vector3& direction) {
-    return ContactRow{-gradient(a, direction, arm_a), gradient(b, direction, arm_b)};
+    return ContactRow{-gradient(a, direction, meets.arm_a), gradient(b, direction, meets.arm_b)};
   };
-  ContactRows out = {row(normal), row(first), row(second), first, second, {}, 0, material.friction, 0, {}};
-  const Vector3 moving = driven(contact.body_b, arm_b) - driven(contact.body_a, arm_a);
-  out.drive = {dot(normal, moving), dot(first, moving), dot(second, moving)};
-  out.separation = separation_of(contact, deepest);
-  const double gap = std::max(0.0, -contact.depth);
-  const double approach = -out.speed(out.normal, a.velocity, b.velocity) - out.drive.x;
-  const double fall = -out.speed(out.normal, a.gravity, b.gravity);
-  const double square_at_impact = approach * approach + 2 * fall * gap;
-  const bool meets = gap < input_.dt * (approach + 0.5 * input_.dt * fall) || gap == 0;
-  const bool bounces = meets && approach > kBouncesAbove * input_.dt * input_.pull_of(contact);
-  out.rebound = bounces ? material.restitution * std::sqrt(std::max(0.0, square_at_impact)) : 0;
-  out.impulse = {impulse.normal, dot(first, impulse.tangential), dot(second, impulse.tangential)};
-  return out;
+  const auto along = [&](const Vector3& x) {
+    return Vector3{dot(contact.normal, x), dot(first, x), dot(second, x)};
+  };
+  const Vector3 moving = driven(contact.body_b, meets.arm_b) - driven(contact.body_a, meets.arm_a);
+  const Vector3 pushed = along(impulse.tangential);
+  return {row(contact.normal),
+          row(first),
+          row(second),
+          first,
+          second,
+          along(moving),
+          meets.separation,
+          material.friction,
+          meets.rebound,
+          {impulse.normal, pushed.y, pushed.z}};
 }
 
 double turning_mobility(const SteppedBody& a, const SteppedBody& b) {

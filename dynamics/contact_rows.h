@@ -47,6 +47,14 @@ struct ContactRows {
   double friction_mobility() const { return std::max(first.mobility(), second.mobility()); }
 };
 
+/// How the bodies of a contact meet.
+struct ContactMeeting {
+  Vector3 arm_a, arm_b;  ///< of the contact, from the centres of mass
+  Vector3 velocity;      ///< of b's point as seen from a's
+  double separation;     ///< of a gap; else the slop less the depth, at most 0
+  double rebound;        ///< velocity along the normal that restitution asks for, or 0
+};
+
 /// Two directions across a normal.
 struct Tangents {
   Vector3 first, second;
@@ -66,22 +74,23 @@ class RowMaker {
     return body != kNoIndex && input_.bodies[body].motion == Motion::moving;
   }
 
-  /// Calls add(i, rows) for each contact of a pair, by place in `contacts`. a, b: its bodies. impulses: of
-  /// all contacts of the step.
-  template <typename Add>
-  void add_contacts(std::span<const std::uint32_t> contacts, const SteppedBody& a, const SteppedBody& b,
-                    std::span<const ContactImpulse> impulses, const Add& add) const {
-    const Material material = material_of(input_.contacts[contacts[0]]);
+  /// Calls visit(i, contact, deepest) for each contact of a pair, by place in `contacts`. deepest: of its
+  /// patch.
+  template <typename Visit>
+  void visit_contacts(std::span<const std::uint32_t> contacts, const Visit& visit) const {
     for (std::size_t begin = 0, end = 0; begin < contacts.size(); begin = end) {
       const ContactPoint* deepest = &input_.contacts[contacts[begin]];
       for (end = begin; end < contacts.size() && is_of_patch(contacts[begin], contacts[end]); ++end) {
         const ContactPoint& contact = input_.contacts[contacts[end]];
         if (contact.depth > deepest->depth) deepest = &contact;
       }
-      for (std::size_t i = begin; i < end; ++i)
-        add(i, rows(input_.contacts[contacts[i]], *deepest, a, b, material, impulses[contacts[i]]));
+      for (std::size_t i = begin; i < end; ++i) visit(i, input_.contacts[contacts[i]], *deepest);
     }
   }
+  ContactMeeting meeting(const ContactPoint& contact, const ContactPoint& deepest,
+                         const Material& material) const;
+  ContactRows rows(const ContactPoint& contact, const ContactPoint& deepest, const SteppedBody& a,
+                   const SteppedBody& b, const Material& material, const ContactImpulse& impulse) const;
 
   Material material_of(const ContactPoint& contact) const {
     return mixed_material(input_.bodies[contact.body_a], input_.bodies[contact.body_b], options_);
@@ -93,10 +102,12 @@ class RowMaker {
   }
 
  private:
-  ContactRows rows(const ContactPoint& contact, const ContactPoint& deepest, const SteppedBody& a,
-                   const SteppedBody& b, const Material& material, const ContactImpulse& impulse) const;
   bool is_of_patch(std::uint32_t first, std::uint32_t contact) const;
   double separation_of(const ContactPoint& contact, const ContactPoint& deepest) const;
+  double rebound_of(const ContactPoint& contact, const ContactMeeting& meeting,
+                    const Material& material) const;
+  Vector3 velocity_at(std::uint32_t body, const Vector3& arm) const;
+  Vector3 pull_at(std::uint32_t body, const Vector3& arm) const;
   Vector3 driven(std::uint32_t body, const Vector3& arm) const;
   Vector3 spin_driven(std::uint32_t body) const;
 

@@ -74,9 +74,12 @@ class ProblemMaker {
     }
     const std::span<const std::uint32_t> contacts = std::span(problem_.contacts).subspan(begin, end - begin);
     for (const std::uint32_t contact : contacts) pair.impulse += impulses_[contact].turning;
-    rows_.add_contacts(
-        contacts, bodies_[a], bodies_[b], impulses_, [&](std::size_t k, const ContactRows& rows) {
+    const Material material = rows_.material_of(input_.contacts[contacts[0]]);
+    rows_.visit_contacts(
+        contacts, [&](std::size_t k, const ContactPoint& contact, const ContactPoint& deepest) {
           const std::size_t i = begin + k;
+          const ContactRows rows =
+              rows_.rows(contact, deepest, bodies_[a], bodies_[b], material, impulses_[contacts[k]]);
           problem_.a[i] = a, problem_.b[i] = b;
           problem_.normal[i] = rows.normal, problem_.first[i] = rows.first, problem_.second[i] = rows.second;
           problem_.first_direction[i] = rows.first_direction,

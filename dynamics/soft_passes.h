@@ -53,11 +53,19 @@ struct Vector3Of {
   TANDEM_INLINE friend L dot(const Vector3Of& p, const Vector3Of& q) {
     return p.x * q.x + p.y * q.y + p.z * q.z;
   }
+  TANDEM_INLINE friend Vector3Of cross(const Vector3Of& p, const Vector3Of& q) {
+    return {p.y * q.z - p.z * q.y, p.z * q.x - p.x * q.z, p.x * q.y - p.y * q.x};
+  }
 };
 
 template <typename L>
 TANDEM_INLINE Vector3Of<L> taken(const SoftNumber (&from)[3], int lane) {
   return {taken<L>(from[0], lane), taken<L>(from[1], lane), taken<L>(from[2], lane)};
+}
+
+template <typename L>
+TANDEM_INLINE void put(const Vector3Of<L>& p, SoftNumber (&to)[3], int lane) {
+  put(p.x, to[0], lane), put(p.y, to[1], lane), put(p.z, to[2], lane);
 }
 
 /// How the body of each lane moves.
@@ -175,8 +183,9 @@ class PairVisit {
 
   TANDEM_INLINE void start() {
     for (std::uint32_t i = 0; i < pairs_.contacts; ++i) {
-      push(direction(normal(i).direction), take(normal(i).impulse));
       SoftFriction& row = friction(i);
+      make_rows(normal(i), row);
+      push(direction(normal(i).direction), take(normal(i).impulse));
       push(direction(row.first), take(row.first_impulse));
       push(direction(row.second), take(row.second_impulse));
     }
@@ -277,6 +286,41 @@ class PairVisit {
   struct Direction {
     Vector3Of<L> along, turn_a, turn_b;
   };
+
+  // See SoftNormal. One mass does for both directions of friction, or it would not oppose the slip.
+  TANDEM_INLINE void make_rows(SoftNormal& normal, SoftFriction& friction) const {
+    const Vector3Of<L> arm_a = taken<L>(normal.direction.turn_a, lane_),
+                       arm_b = taken<L>(normal.direction.turn_b, lane_);
+    const Vector3Of<L> velocity = taken<L>(friction.first.turn_a, lane_),
+                       impulse = taken<L>(friction.second.turn_a, lane_);
+    const L exists = take(normal.mass);
+    const L along_normal = make_turns(normal.direction, arm_a, arm_b);
+    const L along_first = make_turns(friction.first, arm_a, arm_b),
+            along_second = make_turns(friction.second, arm_a, arm_b);
+    const auto inverse = [&](const L& mobility) {
+      return exists / select(less(L{}, mobility), mobility, all_of<L>(1));
+    };
+    put(inverse(along_normal), normal.mass, lane_);
+    put(inverse(larger(along_first, along_second)), friction.mass, lane_);
+    const auto along = [&](const SoftDirection& direction, const Vector3Of<L>& p) {
+      return dot(taken<L>(direction.along, lane_), p);
+    };
+    put(along(normal.direction, velocity), normal.drive, lane_);
+    put(along(friction.first, velocity), friction.first_drive, lane_);
+    put(along(friction.second, velocity), friction.second_drive, lane_);
+    put(along(friction.first, impulse), friction.first_impulse, lane_);
+    put(along(friction.second, impulse), friction.second_impulse, lane_);
+  }
+
+  // Result: by how much an impulse of 1 changes the velocity along the direction.
+  TANDEM_INLINE L make_turns(SoftDirection& direction, const Vector3Of<L>& arm_a,
+                             const Vector3Of<L>& arm_b) const {
+    const Vector3Of<L> along = taken<L>(direction.along, lane_);
+    const Vector3Of<L> turn_a = across(turning_.spread_a, cross(along, arm_a)),
+                       turn_b = across(turning_.spread_b, cross(arm_b, along));
+    put(turn_a, direction.turn_a, lane_), put(turn_b, direction.turn_b, lane_);
+    return inverse_mass_a_ + inverse_mass_b_ + dot(turn_a, turn_a) + dot(turn_b, turn_b);
+  }
 
   TANDEM_INLINE L take(const SoftNumber& from) const { return taken<L>(from, lane_); }
   TANDEM_INLINE Direction direction(const SoftDirection& from) const {

@@ -26,7 +26,10 @@ struct SoftDirection {
   SoftNumber along[3], turn_a[3], turn_b[3];
 };
 
-/// The normals of one contact of each pair: what every sweep looks at.
+/// The normals of one contact of each pair: what every sweep looks at. The first pass makes what follows from
+/// other numbers; until then the normal's turn_a and turn_b are the arms, that is where the contact is from
+/// the centres of mass, mass is 1 where a pair has such a contact, turn_a of the first direction of friction
+/// is the velocity of b's point as seen from a's, and that of the second is the impulse across the normal.
 struct SoftNormal {
   SoftDirection direction;
   SoftNumber mass;  ///< 0 where a pair has no such contact
@@ -86,7 +89,7 @@ struct SoftRows {
 /// variant gives the same bytes.
 struct SoftPasses {
   using Pass = void (*)(const SoftRows& rows, std::uint32_t begin, std::uint32_t end, float time);
-  Pass start;    ///< adds the impulses to the velocities
+  Pass start;    ///< makes the rows, and adds the impulses to the velocities
   Pass push;     ///< soft normals
   Pass follow;   ///< finds the separations where the bodies are now, and does what `relax` does
   Pass relax;    ///< normals without what pushes bodies apart

@@ -32,9 +32,6 @@ void put(const MassScale& scale, SoftNumber (&to)[9], int lane) {
     for (int j = 0; j < 3; ++j) put(at(scale.spread.row[i], j), to[3 * i + j], lane);
   }
 }
-void put(const ContactRow& row, const Vector3& along, SoftDirection& to, int lane) {
-  put(along, to.along, lane), put(row.a.angular, to.turn_a, lane), put(row.b.angular, to.turn_b, lane);
-}
 double inverse_mass(const SteppedBody& body) {
   return body.moves ? 1 / (body.scale.root_mass * body.scale.root_mass) : 0;
 }
@@ -269,34 +266,35 @@ void SoftSolver::fill_pair(const Step& step, const Pair& pair) {
   const Vector3 spin = b.scale.spread * b.velocity.angular - a.scale.spread * a.velocity.angular;
   put(spin + step.rows.turning_drive(step.input.contacts[contacts[0]]), turns.drive, lane);
   put(1 / turning_mobility(a, b), turns.mass, lane);
-  put(step.rows.material_of(step.input.contacts[contacts[0]]).rolling_resistance, turns.lever, lane);
+  const Material material = step.rows.material_of(step.input.contacts[contacts[0]]);
+  put(material.rolling_resistance, turns.lever, lane);
   Vector3 turning;
   for (const std::uint32_t i : contacts) turning += step.impulses[i].turning;
   put(turning / substeps, turns.impulse, lane);
-  step.rows.add_contacts(contacts, a, b, step.impulses, [&](std::size_t i, const ContactRows& rows) {
-    SoftNormal& normal = normals_[group.first + i];
-    const Vector3& along = step.input.contacts[contacts[i]].normal;
-    put(rows.normal, along, normal.direction, lane);
-    put(1 / rows.normal.mobility(), normal.mass, lane);
-    put(rows.drive.x + rows.speed(rows.normal, a.velocity, b.velocity), normal.drive, lane);
-    put(rows.separation, normal.followed, lane);
-    put(rows.impulse.x / substeps, normal.impulse, lane);
-    SoftGap& gap = gaps_[group.first + i];
-    const double less = opposed(step.input.contacts, contacts, along, rows.separation, step.options.slop);
-    put(rows.separation, gap.separation, lane), put(rows.rebound, gap.rebound, lane),
+  step.rows.visit_contacts(
+      contacts, [&](std::size_t i, const ContactPoint& contact, const ContactPoint& deepest) {
+        const ContactMeeting meets = step.rows.meeting(contact, deepest, material);
+        const ContactImpulse& impulse = step.impulses[contacts[i]];
+        const auto [first, second] = Tangents(contact.normal);
+        SoftNormal& normal = normals_[group.first + i];
+        put(contact.normal, normal.direction.along, lane);
+        put(meets.arm_a, normal.direction.turn_a, lane), put(meets.arm_b, normal.direction.turn_b, lane);
+        put(1, normal.mass, lane);
+        put(meets.separation, normal.followed, lane);
+        put(impulse.normal / substeps, normal.impulse, lane);
+        SoftGap& gap = gaps_[group.first + i];
+        const double less =
+            opposed(step.input.contacts, contacts, contact.normal, meets.separation, step.options.slop);
+        put(meets.separation, gap.separation, lane), put(meets.rebound, gap.rebound, lane);
         put(less, gap.opposed, lane);
-    group.bounces = group.bounces || rows.rebound > 0;
-    group.is_opposed = group.is_opposed || less > 0;
-    SoftFriction& friction = frictions_[group.first + i];
-    put(rows.first, rows.first_direction, friction.first, lane);
-    put(rows.second, rows.second_direction, friction.second, lane);
-    put(1 / rows.friction_mobility(), friction.mass, lane);
-    put(rows.friction, friction.coefficient, lane);
-    put(rows.drive.y + rows.speed(rows.first, a.velocity, b.velocity), friction.first_drive, lane);
-    put(rows.drive.z + rows.speed(rows.second, a.velocity, b.velocity), friction.second_drive, lane);
-    put(rows.impulse.y / substeps, friction.first_impulse, lane);
-    put(rows.impulse.z / substeps, friction.second_impulse, lane);
-  });
+        group.bounces = group.bounces || meets.rebound > 0;
+        group.is_opposed = group.is_opposed || less > 0;
+        SoftFriction& friction = frictions_[group.first + i];
+        put(first, friction.first.along, lane), put(second, friction.second.along, lane);
+        put(meets.velocity, friction.first.turn_a, lane);
+        put(impulse.tangential / substeps, friction.second.turn_a, lane);
+        put(material.friction, friction.coefficient, lane);
+      });
 }
 
 void SoftSolver::run(const Step& step) {

@@ -239,7 +239,7 @@ TEST(RollingResistance, TwoBodiesSlowEachOthersTurningAndKeepTheirAngularMomentu
     const std::vector<BodyState> start = step.states;
     const Vector3 before = angular_momentum_of(step, start);
     const ContactImpulse impulse = step.solve(kind)[0];
-    EXPECT_LT(norm(angular_momentum_of(step, start) - before), kind == SolverKind::soft ? 1e-7 : 1e-12);
+    EXPECT_LT(norm(angular_momentum_of(step, start) - before), kind == SolverKind::soft ? 5e-7 : 1e-12);
     const Vector3 turning = step.states[2].angular_velocity - step.states[1].angular_velocity;
     EXPECT_LT(turning.z, 2.95);
     if (kind == SolverKind::soft) continue;  // nothing pushes any more in its last substep

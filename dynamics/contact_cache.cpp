@@ -5,10 +5,6 @@
 namespace tandem::dynamics {
 namespace {
 
-ObjectPair pair_of(const ContactPoint& contact) {
-  return {contact.body_a, contact.body_b};
-}
-
 ObjectPair pair_of(const CachedContact& contact) {
   return contact.pair;
 }
@@ -119,10 +115,15 @@ std::vector<ObjectPair> ContactCache::pairs() const {
 
 void ContactCache::update(std::span<const ContactPoint> found, std::span<const ObjectPair> kept,
                           const BodiesAhead& of) {
-  const std::vector<CachedContact> before = std::move(entries_);
-  is_cold_ = before.empty();
+  before_.swap(entries_);
+  is_cold_ = before_.empty();
+  update_again(found, kept, of);
+}
+
+void ContactCache::update_again(std::span<const ContactPoint> found, std::span<const ObjectPair> kept,
+                                const BodiesAhead& of) {
   entries_.clear(), contacts_.clear(), place_.clear();
-  std::span<const CachedContact> rest = before;
+  std::span<const CachedContact> rest = before_;
   while (!rest.empty() || !found.empty()) {
     const ObjectPair pair = rest.empty()    ? pair_of(found.front())
                             : found.empty() ? pair_of(rest.front())

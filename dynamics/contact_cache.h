@@ -43,6 +43,10 @@ class ContactCache {
   /// kept is ascending.
   void update(std::span<const ContactPoint> found, std::span<const ObjectPair> kept, const BodiesAhead& of);
 
+  /// Does what update() does, of what was remembered when it was last called.
+  void update_again(std::span<const ContactPoint> found, std::span<const ObjectPair> kept,
+                    const BodiesAhead& of);
+
   /// Returns the contacts of the step that update() was last called for, by ascending pair.
   std::span<const ContactPoint> contacts() const { return contacts_; }
 
@@ -64,7 +68,7 @@ class ContactCache {
              double radius);
   void add(const CachedContact& entry, const ContactPoint& contact);
 
-  std::vector<CachedContact> entries_;  // by ascending pair
+  std::vector<CachedContact> entries_, before_;  // by ascending pair; before_: until update()
   std::vector<ContactPoint> contacts_;
   std::vector<std::uint32_t> place_;  // of each contact in entries_
   bool is_cold_ = true;

@@ -3,6 +3,7 @@
 #include <span>
 
 #include "dynamics/rigid_body.h"
+#include "tandem/kernels/object_pair.h"
 
 namespace tandem::dynamics {
 
@@ -15,6 +16,10 @@ struct ContactPoint {
   std::uint64_t feature;         ///< equal in successive steps for what is the same contact; 0: none, to be
                                  ///< matched by position
 };
+
+inline ObjectPair pair_of(const ContactPoint& contact) {
+  return {contact.body_a, contact.body_b};
+}
 
 /// The place of a contact's point in its bodies' frames about their centres of mass, which carry it along.
 struct ContactAnchor {

@@ -20,10 +20,6 @@ double rounding_of(const BodiesAhead& of, const ObjectPair& pair) {
   return kOfSize * (size(pair.a) + size(pair.b));
 }
 
-bool comes_before(const ContactPoint& p, const ContactPoint& q) {
-  return ObjectPair{p.body_a, p.body_b} < ObjectPair{q.body_a, q.body_b};
-}
-
 }  // namespace
 
 ContactsAhead::ContactsAhead(std::span<const AssetView> assets, std::uint32_t threads,
@@ -67,9 +63,7 @@ void ContactsAhead::add_to(std::vector<ContactPoint>& found, std::span<const Obj
   find_approaches(of);
   if (approaches_.empty()) return;
   find_points(of);
-  const auto middle = static_cast<std::ptrdiff_t>(found.size());
-  found.insert(found.end(), points_.begin(), points_.end());
-  std::inplace_merge(found.begin(), found.begin() + middle, found.end(), comes_before);
+  add_points_to(found);
 }
 
 AheadState ContactsAhead::save() const {
@@ -184,20 +178,14 @@ void ContactsAhead::find_approaches(const BodiesAhead& of) {
 
 void ContactsAhead::find_points(const BodiesAhead& of) {
   constexpr double kSameWay = 0.5;  // cosine of the angle between b's way and a normal, at least
-  instances_.clear(), moved_pairs_.clear();
+  clear_moved();
   for (const Approach& approach : approaches_) {
-    const auto first = static_cast<std::uint32_t>(instances_.size());
-    moved_pairs_.push_back({first, first + 1});
-    instances_.push_back(pose_of(of.bodies[approach.pair.a], of.states[approach.pair.a]));
     BodyState moved = of.states[approach.pair.b];
     moved.position += approach.way;
-    instances_.push_back(pose_of(of.bodies[approach.pair.b], moved));
+    add_moved(pose_of(of.bodies[approach.pair.a], of.states[approach.pair.a]),
+              pose_of(of.bodies[approach.pair.b], moved));
   }
-  require(moved_.place(instances_), moved_);
-  require(contacts_.find(moved_, moved_pairs_, {}), moved_);
-  require(manifolds_.find(moved_, contacts_, {.match_previous = false}), moved_);
-  ContactStatistics statistics;
-  take_points(manifolds_, moved_pairs_, points_, statistics);
+  find_points_of_moved();
   std::erase_if(points_, [&](ContactPoint& point) {
     const Approach& approach = approaches_[point.body_a / 2];
     const double along = -dot(approach.way, point.normal);
@@ -207,6 +195,80 @@ void ContactsAhead::find_points(const BodiesAhead& of) {
     point.position -= 0.5 * approach.way;
     return false;
   });
+}
+
+std::span<const ObjectPair> ContactsAhead::add_missed(std::vector<ContactPoint>& found,
+                                                      std::span<const ContactPoint> known,
+                                                      const BodiesAhead& start,
+                                                      std::span<const BodyState> end) {
+  missed_.clear();
+  find_surprised(known, start, end);
+  if (pairs_.empty()) return missed_;
+  clear_moved();
+  for (const ObjectPair& pair : pairs_)
+    add_moved(pose_of(start.bodies[pair.a], end[pair.a]), pose_of(start.bodies[pair.b], end[pair.b]));
+  find_points_of_moved();
+  std::erase_if(points_, [&](ContactPoint& point) {
+    const ObjectPair& pair = pairs_[point.body_a / 2];
+    point.body_a = pair.a, point.body_b = pair.b;
+    if (point.depth <= start.slop) return true;
+    carry(point, anchor_of(point, end), start.states);
+    return point.depth >= 0;
+  });
+  for (const ContactPoint& point : points_) {
+    const ObjectPair pair = {point.body_a, point.body_b};
+    if (missed_.empty() || missed_.back() != pair) missed_.push_back(pair);
+  }
+  add_points_to(found);
+  return missed_;
+}
+
+// Finds the pairs that were not expected to meet, since their bodies were slow and did not touch, and may be
+// deeper in each other than the slop at the end.
+void ContactsAhead::find_surprised(std::span<const ContactPoint> known, const BodiesAhead& start,
+                                   std::span<const BodyState> end) {
+  pairs_.clear();
+  const std::span<const BodyState> from = start.states;
+  const auto turned = [&](std::uint32_t body) {
+    return start.bodies[body].radius * norm(turn_between(from[body].orientation, end[body].orientation));
+  };
+  for (const Apart& apart : apart_) {
+    const ObjectPair& pair = apart.pair;
+    bool touches = false;
+    for (; !known.empty() && pair_of(known.front()) <= pair; known = known.subspan(1))
+      touches = touches || (pair_of(known.front()) == pair && known.front().depth >= 0);
+    if (touches || !apart.slow) continue;
+    const Vector3 moved =
+        (end[pair.b].position - from[pair.b].position) - (end[pair.a].position - from[pair.a].position);
+    const double way = norm(moved) + turned(pair.a) + turned(pair.b);
+    if (way > std::max(0.0, apart.distance) + start.slop) pairs_.push_back(pair);
+  }
+}
+
+void ContactsAhead::clear_moved() {
+  instances_.clear(), moved_pairs_.clear();
+}
+
+void ContactsAhead::add_moved(const Instance& a, const Instance& b) {
+  const auto first = static_cast<std::uint32_t>(instances_.size());
+  moved_pairs_.push_back({first, first + 1});
+  instances_.push_back(a), instances_.push_back(b);
+}
+
+// Finds the contacts of moved_pairs_: points_, of which pair i has bodies 2 i and 2 i + 1.
+void ContactsAhead::find_points_of_moved() {
+  require(moved_.place(instances_), moved_);
+  require(contacts_.find(moved_, moved_pairs_, {}), moved_);
+  require(manifolds_.find(moved_, contacts_, {.match_previous = false}), moved_);
+  ContactStatistics statistics;
+  take_points(manifolds_, moved_pairs_, points_, statistics);
+}
+
+// Adds points_ to those found, which come by ascending pair and go on doing so.
+void ContactsAhead::add_points_to(std::vector<ContactPoint>& found) const {
+  const auto middle = static_cast<std::ptrdiff_t>(found.size());
+  found.insert(found.end(), points_.begin(), points_.end());
+  std::ranges::inplace_merge(found, found.begin() + middle, {}, pair_of);
 }
 
 }  // namespace tandem::dynamics

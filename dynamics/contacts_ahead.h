@@ -46,6 +46,15 @@ class ContactsAhead {
   /// nothing but the arguments. Condition: find_near() was called for the same bodies. Throws QueryFailed.
   void add_to(std::vector<ContactPoint>& found, std::span<const ObjectPair> kept, const BodiesAhead& of);
 
+  /// Adds to those found what a step missed: contacts of slow pairs that did not touch at its start and are
+  /// deeper in each other than the slop at its end, because something pushed them. They are those of the end,
+  /// carried back to the start, where they are gaps. known: with which the step was solved, by ascending
+  /// pair. Result: the pairs that have such contacts, ascending; valid until the next call. Condition:
+  /// add_to() was called with the same start. Throws QueryFailed.
+  std::span<const ObjectPair> add_missed(std::vector<ContactPoint>& found,
+                                         std::span<const ContactPoint> known, const BodiesAhead& start,
+                                         std::span<const BodyState> end);
+
   /// Return what the next call takes distances from, and let it go on from there.
   AheadState save() const;
   void restore(AheadState state);
@@ -77,6 +86,12 @@ class ContactsAhead {
   void find_distances(std::span<const ContactPoint> found, std::span<const ObjectPair> kept, double overlap);
   void find_approaches(const BodiesAhead& of);
   void find_points(const BodiesAhead& of);
+  void find_surprised(std::span<const ContactPoint> known, const BodiesAhead& start,
+                      std::span<const BodyState> end);
+  void clear_moved();
+  void add_moved(const Instance& a, const Instance& b);
+  void find_points_of_moved();
+  void add_points_to(std::vector<ContactPoint>& found) const;
 
   PairFilter filter_;
   Scene scene_, moved_;  // all bodies; two of each approach, moved
@@ -92,7 +107,7 @@ class ContactsAhead {
   std::vector<Motion> motion_;
   std::vector<double> turning_;  // how fast points of each body move by its spin, at most
   std::vector<Instance> instances_;
-  std::vector<ObjectPair> pairs_, moved_pairs_;
+  std::vector<ObjectPair> pairs_, moved_pairs_, missed_;
   std::vector<Asked> asked_;
   std::vector<Approach> approaches_;
   std::vector<ContactPoint> points_;

@@ -88,23 +88,50 @@ void Simulation::find_contacts(StepRecord& record) {
   }
 }
 
+// A step that misses contacts is solved again with them: what pushes a body may be found by no question that
+// is asked before, since the velocity that it gives is not known yet.
 void Simulation::solve(StepRecord& record) {
-  const std::span<const ContactPoint> contacts = cache_.contacts();
-  islands_ = find_islands(acting_, contacts, joined_);
-  std::vector<ContactImpulse> impulses(contacts.size());
-  if (options_.solver.warm_start) impulses = cache_.impulses();
-  const std::vector<BodyState> before = parts_.continuous ? states_ : std::vector<BodyState>();
-  parts_.solver->step({acting_, contacts, islands_, options_.dt, pulls_, step_, cache_.is_cold(), threads_,
-                       joints_, joint_memory_},
-                      states_, impulses);
+  constexpr int kMostTimes = 3;
+  const std::vector<BodyState> before = states_;
+  const std::vector<JointMemory> joints_before = joint_memory_;
+  std::vector<ContactImpulse> impulses = solve_contacts();
+  for (int times = 1; times < kMostTimes && find_missed(before); ++times) {
+    states_ = before, joint_memory_ = joints_before;
+    impulses = solve_contacts();
+  }
   if (parts_.continuous) parts_.continuous->limit(acting_, before, states_, options_.solver.slop);
   follow_joints(options_.dt);
   cache_.remember(impulses);
-  touches_.update(contacts, impulses, idle());
+  touches_.update(cache_.contacts(), impulses, idle());
   record.residual_max = parts_.solver->statistics().residual;
   record.residual_rms = parts_.solver->statistics().residual_rms;
   record.islands = parts_.solver->statistics().islands;
   record.newton_islands = parts_.solver->statistics().newton_islands;
+}
+
+std::vector<ContactImpulse> Simulation::solve_contacts() {
+  const std::span<const ContactPoint> contacts = cache_.contacts();
+  islands_ = find_islands(acting_, contacts, joined_);
+  std::vector<ContactImpulse> impulses(contacts.size());
+  if (options_.solver.warm_start) impulses = cache_.impulses();
+  parts_.solver->step({acting_, contacts, islands_, options_.dt, pulls_, step_, cache_.is_cold(), threads_,
+                       joints_, joint_memory_},
+                      states_, impulses);
+  return impulses;
+}
+
+// Returns whether the step, which began with the bodies like this, missed contacts, and adds them.
+bool Simulation::find_missed(std::span<const BodyState> before) {
+  if (!parts_.ahead) return false;
+  const std::vector<std::uint8_t> idle = this->idle();
+  const BodiesAhead start = {acting_, before, idle, options_.dt, pulls_, options_.solver.slop};
+  const std::span<const ObjectPair> missed =
+      parts_.ahead->add_missed(found_, cache_.contacts(), start, states_);
+  if (missed.empty()) return false;
+  std::vector<ObjectPair> kept;
+  std::ranges::set_difference(parts_.contacts->kept(), missed, std::back_inserter(kept));
+  cache_.update_again(found_, kept, start);
+  return true;
 }
 
 void Simulation::sleep() {

@@ -119,6 +119,8 @@ class Simulation {
   void find_pulls();
   void find_contacts(StepRecord& record);
   void solve(StepRecord& record);
+  std::vector<ContactImpulse> solve_contacts();
+  bool find_missed(std::span<const BodyState> before);
   void sleep();
   void update_acting();
   void follow_joints(double time);

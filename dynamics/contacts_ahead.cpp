@@ -41,7 +41,7 @@ void ContactsAhead::find_near(const BodiesAhead& of) {
     while (before != apart_.end() && before->pair < pair) ++before;
     Apart& now = now_apart_.emplace_back(Apart{pair});
     if (before != apart_.end() && before->pair == pair)
-      now.distance = before->distance - way_between(pair) * (1 + 1e-9);
+      now.distance = before->distance - ways_.between(pair) * (1 + 1e-9);
     const double way = of.dt * (norm(approach_of(pair, of.states)) + turning_of(pair));
     const double margin = of.fall(pair) + of.overlap();
     const double rounding = rounding_of(of, pair);
@@ -93,16 +93,20 @@ void ContactsAhead::place(const BodiesAhead& of) {
   require(scene_.place(instances_, filter_), scene_);
 }
 
+void ContactsAhead::Ways::find(std::span<const BodyProperties> bodies, std::span<const BodyState> from,
+                               std::span<const BodyState> to) {
+  of_centre_.resize(bodies.size()), about_it_.resize(bodies.size());
+  for (std::size_t i = 0; i < bodies.size(); ++i) {
+    of_centre_[i] = to[i].position - from[i].position;
+    about_it_[i] = bodies[i].radius * norm(turn_between(from[i].orientation, to[i].orientation));
+  }
+}
+
 // Finds how far bodies have moved since the last call.
 void ContactsAhead::follow(const BodiesAhead& of) {
-  const std::span<const BodyState> states = of.states;
-  if (before_.size() != states.size()) apart_.clear(), before_.assign(states.begin(), states.end());
-  way_.resize(states.size()), turn_.resize(states.size());
-  for (std::size_t i = 0; i < states.size(); ++i) {
-    turn_[i] = of.bodies[i].radius * norm(turn_between(before_[i].orientation, states[i].orientation));
-    way_[i] = states[i].position - before_[i].position;
-    before_[i] = states[i];
-  }
+  if (before_.size() != of.states.size()) apart_.clear(), before_.assign(of.states.begin(), of.states.end());
+  ways_.find(of.bodies, before_, of.states);
+  std::ranges::copy(of.states, before_.begin());
 }
 
 // The velocity of b's centre as seen from a's.
@@ -228,20 +232,14 @@ std::span<const ObjectPair> ContactsAhead::add_missed(std::vector<ContactPoint>&
 void ContactsAhead::find_surprised(std::span<const ContactPoint> known, const BodiesAhead& start,
                                    std::span<const BodyState> end) {
   pairs_.clear();
-  const std::span<const BodyState> from = start.states;
-  const auto turned = [&](std::uint32_t body) {
-    return start.bodies[body].radius * norm(turn_between(from[body].orientation, end[body].orientation));
-  };
+  ways_.find(start.bodies, start.states, end);
   for (const Apart& apart : apart_) {
     const ObjectPair& pair = apart.pair;
     bool touches = false;
     for (; !known.empty() && pair_of(known.front()) <= pair; known = known.subspan(1))
       touches = touches || (pair_of(known.front()) == pair && known.front().depth >= 0);
     if (touches || !apart.slow) continue;
-    const Vector3 moved =
-        (end[pair.b].position - from[pair.b].position) - (end[pair.a].position - from[pair.a].position);
-    const double way = norm(moved) + turned(pair.a) + turned(pair.b);
-    if (way > std::max(0.0, apart.distance) + start.slop) pairs_.push_back(pair);
+    if (ways_.between(pair) > std::max(0.0, apart.distance) + start.slop) pairs_.push_back(pair);
   }
 }
 

@@ -69,6 +69,21 @@ class ContactsAhead {
     std::size_t place;
     ObjectDistance distance;
   };
+  /// How far bodies have gone from one state to another.
+  class Ways {
+   public:
+    void find(std::span<const BodyProperties> bodies, std::span<const BodyState> from,
+              std::span<const BodyState> to);
+
+    /// Returns how far points of one body have moved as seen from the other, at most.
+    double between(const ObjectPair& pair) const {
+      return norm(of_centre_[pair.b] - of_centre_[pair.a]) + about_it_[pair.a] + about_it_[pair.b];
+    }
+
+   private:
+    std::vector<Vector3> of_centre_;
+    std::vector<double> about_it_;  // the most that a point has
+  };
   struct Approach {
     ObjectPair pair;
     Vector3 way;  ///< of b, until it overlaps a
@@ -76,10 +91,6 @@ class ContactsAhead {
   void place(const BodiesAhead& of);
   void follow(const BodiesAhead& of);
   bool is_still(std::uint32_t body) const { return motion_[body] == Motion::fixed; }
-  /// How far points of one body have moved as seen from the other since the last call, at most.
-  double way_between(const ObjectPair& pair) const {
-    return norm(way_[pair.b] - way_[pair.a]) + turn_[pair.a] + turn_[pair.b];
-  }
   double turning_of(const ObjectPair& pair) const { return turning_[pair.a] + turning_[pair.b]; }
   Vector3 approach_of(const ObjectPair& pair, std::span<const BodyState> states) const;
   double farthest(const BodiesAhead& of) const;
@@ -100,8 +111,7 @@ class ContactsAhead {
   ManifoldQuery manifolds_;
 
   std::vector<BodyState> before_;  // of the last call
-  std::vector<Vector3> way_;       // of each body's centre since then
-  std::vector<double> turn_;       // how far points of each body have moved about its centre, at most
+  Ways ways_;
   std::vector<Apart> apart_, now_apart_;
   std::vector<ObjectPair> slow_, fast_;
   std::vector<Motion> motion_;

@@ -154,7 +154,7 @@ void ContactsAhead::find_distances(std::span<const ContactPoint> found, std::spa
     double reach = 0;
     for (const std::uint32_t i : places)
       pairs_.push_back(apart_[i].pair), reach = std::max(reach, apart_[i].reach);
-    const DistanceOptions options = {.tolerance = {kExact * overlap, 0.05}, .reach = 2 * reach};
+    const DistanceOptions options = {.tolerance = {kExact * overlap, 0.1}, .reach = 1.5 * reach};
     require(distances_.find(scene_, pairs_, options), scene_);
     for (std::size_t i = 0; i < places.size(); ++i) {
       const ObjectDistance& distance = distances_.rows()[i];

@@ -266,7 +266,8 @@ void ContactsAhead::find_points_of_moved() {
 void ContactsAhead::add_points_to(std::vector<ContactPoint>& found) const {
   const auto middle = static_cast<std::ptrdiff_t>(found.size());
   found.insert(found.end(), points_.begin(), points_.end());
-  std::ranges::inplace_merge(found, found.begin() + middle, {}, pair_of);
+  std::ranges::inplace_merge(found, found.begin() + middle, {},
+                             [](const ContactPoint& contact) { return pair_of(contact); });
 }
 
 }  // namespace tandem::dynamics

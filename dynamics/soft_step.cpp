@@ -279,7 +279,7 @@ void SoftSolver::fill_pair(const Step& step, const Pair& pair) {
         SoftNormal& normal = normals_[group.first + i];
         put(contact.normal, normal.direction.along, lane);
         put(meets.arm_a, normal.direction.turn_a, lane), put(meets.arm_b, normal.direction.turn_b, lane);
-        put(1, normal.mass, lane);
+        put(1.0, normal.mass, lane);
         put(meets.separation, normal.followed, lane);
         put(impulse.normal / substeps, normal.impulse, lane);
         SoftGap& gap = gaps_[group.first + i];

@@ -15,7 +15,7 @@ namespace tandem {
 namespace {
 
 // Near pairs that a thread looks at at a time.
-constexpr std::size_t kPairsAtOnce = 4096;
+constexpr std::size_t kNearAtOnce = 4096;
 
 // Bodies that a worker poses at a time: some microseconds of work.
 constexpr std::size_t kBodiesAtOnce = 64;
@@ -404,14 +404,14 @@ bool SceneState::near_pairs_hold(std::uint32_t workers) {
 Status SceneState::take_near_pairs() {
   const std::span<const ObjectPair> near = near_.pairs();
   const std::span<const WorldBox> of = asked_boxes();
-  const std::size_t parts = (near.size() + kPairsAtOnce - 1) / kPairsAtOnce;
+  const std::size_t parts = (near.size() + kNearAtOnce - 1) / kNearAtOnce;
   const std::uint32_t workers = workers_for(parts, 1);
   if (!found_.resize(near.size()) || !meeting_.resize(parts)) return Status::kOutOfMemory;
   if (!threads.provide(workers)) return Status::kCannotStartThread;
   ObjectPair* const found = found_.data();
   threads.for_parts(workers, parts, 1, [&](std::size_t part, std::size_t last, std::uint32_t) {
     for (; part < last; ++part) {
-      const std::size_t begin = part * kPairsAtOnce, end = std::min(begin + kPairsAtOnce, near.size());
+      const std::size_t begin = part * kNearAtOnce, end = std::min(begin + kNearAtOnce, near.size());
       std::size_t next = begin;
       for (std::size_t i = begin; i < end; ++i) {
         const ObjectPair pair = near[i];
@@ -423,7 +423,7 @@ Status SceneState::take_near_pairs() {
   });
   std::size_t count = 0;
   for (std::size_t part = 0; part < parts; ++part) {
-    const ObjectPair* const first = found + part * kPairsAtOnce;
+    const ObjectPair* const first = found + part * kNearAtOnce;
     std::copy(first, first + meeting_[part], found + count);
     count += meeting_[part];
   }

@@ -188,8 +188,8 @@ class World:
             joints: between these bodies, and with the world.
 
         Raises:
-            Error: as of `Scene.place`; a velocity or gravity_scale that is not finite; a moving body whose mesh has no topology or no extent, or whose density is not positive; a
-                joint of a body that there is not, of two that nothing moves, without an axis, or with numbers that its kind cannot have. There are no bodies then.
+            Error: as of `Scene.place`; a velocity beyond 1e10 along an axis, a mass that is not from 1e-30 to 1e30 kg, or a gravity_scale beyond 1e6; a moving body whose
+                mesh has no topology or no extent, or whose density is not positive; a joint of a body that there is not, of two that nothing moves, without an axis, or with numbers that its kind cannot have. There are no bodies then.
         """
         bodies = instances_of(instances, asset, rotation, translation, transform)
         given = (_of_each(density, "density", len(bodies)), _of_each(velocity, "velocity", len(bodies), 3),
@@ -209,7 +209,7 @@ class World:
         """Makes steps of dt seconds, from more than 0 to 1000. Ctrl-C, and an error, leave the bodies as after the last step that was whole.
 
         Raises:
-            Error: a body has left the range of numbers that questions take; `where` is the body.
+            Error: a body has left the range of numbers that questions take, or has become faster than `place` allows; `where` is the body. There are no contacts then.
         """
         duration = number(dt, "dt")
         if not 0 < duration <= 1000:

@@ -24,7 +24,8 @@ void expect_finite(const World& world) {
                            body.angular_velocity));
   }
   for (const WorldContact& contact : world.contacts())
-    EXPECT_TRUE(are_finite(contact.position, contact.normal, contact.impulse) && std::isfinite(contact.depth));
+    EXPECT_TRUE(are_finite(contact.position, contact.normal, contact.impulse) &&
+                std::isfinite(contact.depth));
 }
 
 // Steps until the end or an error, which has to be that of a body that left the range of numbers.

@@ -570,7 +570,7 @@ def test_the_command_simulates(falling_file, box, tmp_path):
     written = (matplotlib.image.imread(tmp_path / "a.png")[..., :3] * 255).round().astype(np.uint8)
     assert np.array_equal(written, tandem.view(world, off_screen=True, size=SIZE))
     for arguments, code, text in ((["--dt", "1/60"], 2, "--dt belongs to --simulate"), (["--simulate", "--dt", "0"], 2, "dt is 0"),
-                                  (["--simulate", "--dt", "1/0"], 1, "invalid _seconds value"), (["--simulate", "--step", "-1"], 2, "steps is -1")):
+                                  (["--simulate", "--dt", "1/0"], 1, "invalid seconds value"), (["--simulate", "--step", "-1"], 2, "steps is -1")):
         result = command("view", falling_file, *arguments, "-o", tmp_path / "b.png")
         assert result.returncode == code and text in result.stderr and result.stderr.count("\n") == 1
 

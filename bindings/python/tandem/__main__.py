@@ -54,7 +54,7 @@ def _parser() -> argparse.ArgumentParser:
     view.add_argument("--step", type=int, help="of a run: steps made before the state (default: the last); with --simulate: to be made before")
     view.add_argument("--simulate", action="store_true", help="the bodies of a scene file move: space stops them, right makes one step, "
                       "Home goes back")
-    view.add_argument("--dt", type=_seconds, help="with --simulate: length of a step, such as 1/120 (default: 1/60)")
+    view.add_argument("--dt", type=seconds, help="with --simulate: length of a step, such as 1/120 (default: 1/60)")
     view.add_argument("--azimuth", type=float, default=-60, help="degrees; 0 from +x, 90 from +y (default: -60)")
     view.add_argument("--elevation", type=float, default=24, help="degrees above the horizon (default: 24)")
     view.add_argument("--width", type=int, default=900, help="in pixels (default: 900)")
@@ -66,7 +66,7 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _seconds(word: str) -> float:
+def seconds(word: str) -> float:
     """A number or a quotient of two."""
     parts = [float(part) for part in word.split("/")]
     if len(parts) > 2 or 0 in parts[1:]:

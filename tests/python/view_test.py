@@ -1,42 +1,23 @@
-"""tandem.view(): what its pictures show, and where. The project's own z-buffer (scripts/render.py) says what ought to be there."""
-import colorsys
+"""tandem.view(): what its pictures show, and where."""
 import json
 import os
-import pathlib
 import re
 import shlex
-import shutil
 import subprocess
 import sys
 
 import numpy as np
 import pytest
 
-SOURCE_DIR = pathlib.Path(os.environ["TANDEM_SOURCE_DIR"])
-sys.path.append(os.fspath(SOURCE_DIR / "scripts"))
+# Where nothing draws, this skips all that follows.
+from pictures import RED, SIZE, SOURCE_DIR, TURNED, around, body_of_pixels, box, command, grown, h5py, hue_distance, hues, inner, is_backdrop, projected, render, write_run
 
-pytest.importorskip("pyvista")
-h5py = pytest.importorskip("h5py")
-render = pytest.importorskip("render", reason="scripts/render.py needs matplotlib")
-DRAWS = "import pyvista; plotter = pyvista.Plotter(off_screen=True); plotter.add_mesh(pyvista.Sphere()); plotter.screenshot()"
-if subprocess.run([sys.executable, "-c", DRAWS], capture_output=True).returncode:
-    pytest.skip("VTK cannot draw off screen here: it needs EGL or OSMesa (libegl1 libgl1-mesa-dri)", allow_module_level=True)
+import matplotlib
+import matplotlib.image
 
-import matplotlib  # noqa: E402
-import matplotlib.image  # noqa: E402
-
-import tandem  # noqa: E402
-from meshes import BOX_FACES, BOX_VERTICES, read_obj  # noqa: E402
-from tandem import live_view, scene_files, tree, viewer  # noqa: E402
-
-SIZE = (320, 200)
-RED = 0.99  # its hue, of 1
-TURNED = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
-
-
-@pytest.fixture(scope="module")
-def box():
-    return tandem.build(BOX_VERTICES, BOX_FACES)
+import tandem
+from meshes import BOX_FACES, BOX_VERTICES, read_obj
+from tandem import scene_files, tree, viewer
 
 
 @pytest.fixture(scope="module")
@@ -65,68 +46,6 @@ def herd(cow):
     orthogonal = np.linalg.qr(random.normal(size=(6, 3, 3)))[0]
     rotation = orthogonal * np.linalg.det(orthogonal)[:, None, None]
     return [cow], tandem.instances(np.zeros(6, int), rotation=rotation, translation=random.uniform(-0.6, 0.6, (6, 3)))
-
-
-def projected(view, points):
-    """Points (..., 3) of the world: x and y in pixels, and the inverse of the distance."""
-    camera = view.plotter.camera
-    position, focus, up = (np.array(v) for v in (camera.position, camera.focal_point, camera.up))
-    back = (position - focus) / np.linalg.norm(position - focus)
-    right = np.cross(up, back)
-    seen = (points - view.origin - position) @ np.array([right, np.cross(back, right), back]).T
-    scale = SIZE[1] / 2 / np.tan(np.radians(camera.view_angle / 2))
-    away = -seen[..., 2]
-    return np.stack([SIZE[0] / 2 + scale * seen[..., 0] / away, SIZE[1] / 2 - scale * seen[..., 1] / away, 1 / away], -1)
-
-
-def body_of_pixels(view, assets, instances):
-    """What a z-buffer says each pixel shows: a row of instances, or -1."""
-    posed = [assets[row["asset"]].triangles() @ row["rotation"].T + row["translation"] for row in instances]
-    body = np.repeat(np.arange(len(posed)), [len(triangles) for triangles in posed])
-    nearest = render.rasterise(projected(view, np.concatenate(posed)), SIZE)[1]
-    return np.where(nearest < 0, -1, body[nearest])
-
-
-def is_backdrop(picture):
-    """Whether a pixel is as the backdrop is in the leftmost pixel of its row, which shows no body."""
-    return np.abs(picture.astype(int) - picture[:, :1]).max(axis=2) <= 2
-
-
-def hues(colours):
-    """Hue and saturation of 8-bit colours, (..., 2)."""
-    return np.array([colorsys.rgb_to_hsv(*(colour / 255))[:2] for colour in colours.reshape(-1, 3)]).reshape(*colours.shape[:-1], 2)
-
-
-def hue_distance(a, b):
-    return np.abs((a - b + 0.5) % 1 - 0.5)
-
-
-def around(label):
-    """Of each pixel what it and its eight neighbours show, (9, height, width)."""
-    padded = np.pad(label, 1, mode="edge")
-    return np.array([padded[y:y + label.shape[0], x:x + label.shape[1]] for y in range(3) for x in range(3)])
-
-
-def inner(label):
-    """Pixels whose neighbours show the same."""
-    return (around(label) == label).all(axis=0)
-
-
-def grown(mask):
-    return around(mask).any(axis=0)
-
-
-def write_run(path, box):
-    """A run of two boxes that moves the second away along y: after 0, 5 and 10 steps."""
-    box.save(path.parent / "box.bvh")
-    with h5py.File(path, "w") as file:
-        file["assets"] = ["box.bvh"]
-        file["bodies/asset"], file["bodies/motion"] = np.zeros(2, "u4"), np.zeros(2, "u4")
-        file["bodies/centre_of_mass"] = np.full((2, 3), 0.5)
-        file["trajectory/frame"] = np.array([0, 5, 10], "u4")
-        file["trajectory/position"] = np.array([[[0, 0, 0], [0, 0.9 + k, 0]] for k in range(3)], float)
-        half = np.sqrt(0.5)
-        file["trajectory/orientation"] = np.tile([[1.0, 0, 0, 0], [half, 0, 0, half]], (3, 1, 1))
 
 
 # ---- Bodies
@@ -428,224 +347,6 @@ def test_no_assets_are_kept_once_a_view_is_closed(box, tmp_path):
     assert (result.returncode, result.stdout, result.stderr) == (0, "", "")
 
 
-# ---- Worlds that go on
-
-FLOOR = 4 * (BOX_VERTICES - [0.5, 0.5, 1])
-
-
-def falling(box, **options):
-    """A box that falls on a floor, turning."""
-    return tandem.World([tandem.build(FLOOR, BOX_FACES), box], asset=[0, 1], translation=[[0, 0, 0], [0, 0, 2.5]], angular_velocity=[[0, 0, 0], [1, 2, 3]],
-                        filter=tandem.Filter(motion=[tandem.FIXED, tandem.MOVING]), **options)
-
-
-def drawn_places(view):
-    """Where the middles of the bodies' meshes are drawn, in the world."""
-    places = np.empty((len(view.world.translation), 3))
-    for row, mapper in enumerate(view._bodies):
-        places[view._asset == row] = np.asarray(viewer.pyvista.wrap(mapper.GetInput()).points) + view.origin
-    return places
-
-
-def middles(world):
-    return np.array([row["rotation"] @ np.mean(world.assets[row["asset"]].bounds, axis=0) + row["translation"] for row in world.instances])
-
-
-@pytest.fixture
-def live():
-    views = []
-
-    def make(world, **options):
-        views.append(live_view.LiveView(world, off_screen=True, **{"size": SIZE, **options}))
-        return views[-1]
-
-    yield make
-    for view in views:
-        view.close()
-
-
-def test_a_world_is_drawn_where_it_is_as_it_goes_on(live, box):
-    view, beside = live(falling(box), dt=1 / 120), falling(box)
-    seen = []
-    for steps in (0, 1, 30, 60):
-        view.step(steps)
-        beside.step(1 / 120, steps)
-        assert np.array_equal(view.world.instances, beside.instances)
-        assert np.allclose(drawn_places(view), middles(beside), atol=1e-6)
-        seen.append(view.picture())
-        # The box and the floor are where a z-buffer puts them.
-        expected = body_of_pixels(view, view.world.assets, view.world.instances)
-        clear = inner(expected)
-        clear[:30, :80] = False  # where the time is written
-        drawn = ~is_backdrop(seen[-1])
-        assert (expected == 1).sum() > 300 and drawn[clear & (expected >= 0)].all()
-    assert all(not np.array_equal(one, other) for one, other in zip(seen, seen[1:]))
-    view.world.push(1, [0, 0, 9000])
-    beside.push(1, [0, 0, 9000])
-    beside.step(1 / 60, 20)
-    view.world.step(1 / 60, 20)  # by somebody else
-    view.refresh()
-    assert np.allclose(drawn_places(view), middles(beside), atol=1e-6)
-    view.restart()
-    assert view.world.time == 0 and np.allclose(drawn_places(view), middles(falling(box)), atol=1e-6)
-
-
-def test_the_camera_follows_until_it_is_moved(live, box):
-    world = falling(box)
-    world.push(1, [4000, 0, 9000])
-    for moved in (False, True):
-        view = live(world)
-        if moved:
-            view.plotter.camera.position = np.array(view.plotter.camera.position) + 0.1
-        before = tuple(view.plotter.camera.position)
-        for _ in range(40):
-            view.step()
-            x, y, _ = projected(view, middles(view.world)[1])
-            assert moved or (0 < x < SIZE[0] and 0 < y < SIZE[1])
-        assert (tuple(view.plotter.camera.position) == before) == moved
-
-
-def test_contacts_of_a_world_are_found_anew(live, box):
-    view = live(falling(box), contacts=True)
-    red = []
-    for _ in range(3):
-        saturated = hues(view.picture())
-        red.append(((hue_distance(saturated[..., 0], RED) < 0.05) & (saturated[..., 1] > 0.6)).any())
-        view.step(60)
-    assert red == [False, True, True]
-
-
-def test_a_picture_of_a_world_is_that_of_its_bodies(box):
-    world = falling(box)
-    world.step(1 / 60, 10)
-    assert np.array_equal(tandem.view(world, off_screen=True, size=SIZE)[30:],
-                          tandem.view(world.assets, world.instances, motion=world.motion, off_screen=True, size=SIZE)[30:])
-    assert world.time == pytest.approx(1 / 6)
-
-
-@pytest.mark.parametrize(("options", "text"), [({"dt": 0}, "dt is 0"), ({"dt": np.nan}, "dt is nan"), ({"step": 3}, "step 3: the run keeps")])
-def test_arguments_of_a_living_view_are_named(box, options, text):
-    with pytest.raises(ValueError, match=text):
-        tandem.view(falling(box), off_screen=True, **options)
-    found = tandem.Scene([box], translation=[[0, 0, 0]]).contacts()
-    with pytest.raises(ValueError, match="contacts: what was found belongs to one state"):
-        tandem.view(falling(box), off_screen=True, contacts=found)
-    with pytest.raises(TypeError, match="dt"):
-        tandem.view(box, off_screen=True, dt=1 / 60)
-    with pytest.raises(ValueError, match="no body to show"):
-        tandem.view(tandem.World([box]), off_screen=True)
-
-
-@pytest.fixture
-def falling_file(box, tmp_path):
-    """A scene file of falling(), at half the density, with a velocity."""
-    box.save(tmp_path / "box.bvh")
-    tandem.build(FLOOR, BOX_FACES).save(tmp_path / "floor.bvh")
-    with h5py.File(tmp_path / "scene.h5", "w") as file:
-        file["assets"], file["instances/asset"] = ["floor.bvh", "box.bvh"], np.array([0, 1], "u4")
-        file["instances/rotation"], file["instances/translation"] = np.stack([np.eye(3)] * 2), np.array([[0, 0, 0], [0, 0, 2.5]])
-        file["simulation/motion"], file["simulation/density"] = np.array([1, 0], "u1"), np.full(2, 500.0)
-        file["simulation/velocity"], file["simulation/angular_velocity"] = np.zeros((2, 3)), np.array([[0, 0, 0], [1.0, 2, 3]])
-    return tmp_path / "scene.h5"
-
-
-def test_a_world_of_a_scene_file(falling_file, box, tmp_path):
-    world, same = scene_files.world(falling_file, friction=0.2), falling(box, density=500, friction=0.2)
-    assert world.mass == pytest.approx([0, 500]) and world.motion.tolist() == [tandem.FIXED, tandem.MOVING]
-    world.step(1 / 60, 60)
-    same.step(1 / 60, 60)
-    assert np.array_equal(world.instances, same.instances)
-    for name, text in (("box.bvh", "is an asset"), ("run.h5", "is a run; bvhbench frame makes")):
-        if name == "run.h5":
-            write_run(tmp_path / name, box)
-        with pytest.raises(ValueError, match=f"{name}: {text}"):
-            scene_files.world(tmp_path / name)
-
-
-def test_the_command_simulates(falling_file, box, tmp_path):
-    result = command("view", falling_file, "--simulate", "--dt", "1/120", "--step", "70", "--width", "320", "--height", "200", "-o", tmp_path / "a.png")
-    assert (result.returncode, result.stdout, result.stderr) == (0, "", "")
-    world = falling(box, density=500)
-    world.step(1 / 120, 70)
-    written = (matplotlib.image.imread(tmp_path / "a.png")[..., :3] * 255).round().astype(np.uint8)
-    assert np.array_equal(written, tandem.view(world, off_screen=True, size=SIZE))
-    for arguments, code, text in ((["--dt", "1/60"], 2, "--dt belongs to --simulate"), (["--simulate", "--dt", "0"], 2, "dt is 0"),
-                                  (["--simulate", "--dt", "1/0"], 1, "invalid seconds value"), (["--simulate", "--step", "-1"], 2, "steps is -1")):
-        result = command("view", falling_file, *arguments, "-o", tmp_path / "b.png")
-        assert result.returncode == code and text in result.stderr and result.stderr.count("\n") == 1
-
-
-@pytest.fixture
-def display(monkeypatch):
-    """A display that nobody sees."""
-    if shutil.which("Xvfb") is None:
-        pytest.skip("a window needs Xvfb here")
-    reading, writing = os.pipe()
-    with subprocess.Popen(["Xvfb", "-displayfd", str(writing), "-screen", "0", "800x600x24", "-nolisten", "tcp"], pass_fds=[writing], stderr=subprocess.DEVNULL) as server:
-        os.close(writing)
-        with os.fdopen(reading) as number:
-            monkeypatch.setenv("DISPLAY", ":" + number.readline().strip())
-        yield
-        server.terminate()
-
-
-KEYS = """
-import sys
-import tandem
-from tandem import live_view, scene_files
-
-told = []
-
-class Watched(live_view.LiveView):
-    pictures = 0
-
-    def _look_after(self, due):
-        self.pictures += 1
-        key = {10: "space", 15: "Right", 16: "Right", 20: "Home", 25: "space", 30: "q"}.get(self.pictures)
-        if key:
-            keys = self.plotter.iren.interactor
-            keys.SetKeySym(key)
-            keys.InvokeEvent("KeyPressEvent")
-            if key == "q":
-                keys.SetKeyCode("q")
-                keys.InvokeEvent("CharEvent")
-        told.append(round(self.world.time * 60))
-        super()._look_after(due)
-
-live_view.LiveView = Watched
-tandem.view(scene_files.world(sys.argv[1]), size=(320, 200))
-print(told)
-"""
-
-
-def test_keys_of_the_window(falling_file, display):
-    result = subprocess.run([sys.executable, "-c", KEYS, falling_file], capture_output=True, text=True, timeout=120)
-    assert (result.returncode, result.stderr) == (0, "")
-    assert json.loads(result.stdout) == [*range(1, 11), 10, 10, 10, 10, 11, 12, 12, 12, 12, *6 * [0], *range(1, 6)]
-
-
-CTRL_C = """
-import os
-import signal
-import sys
-from tandem import __main__, live_view
-
-class Watched(live_view.LiveView):
-    def _look_after(self, due):
-        if self.world.time > 0.1:
-            os.kill(os.getpid(), signal.SIGINT)
-        super()._look_after(due)
-
-live_view.LiveView = Watched
-sys.exit(__main__.main(["view", sys.argv[1], "--simulate"]))
-"""
-
-
-def test_ctrl_c_shuts_the_window(falling_file, display):
-    result = subprocess.run([sys.executable, "-c", CTRL_C, falling_file], capture_output=True, text=True, timeout=120)
-    assert (result.returncode, result.stdout, result.stderr) == (130, "", "")
-
-
 # ---- Arguments, and the command
 
 @pytest.mark.parametrize(("options", "text"), [
@@ -738,10 +439,6 @@ def test_a_run_file_whose_rows_do_not_fit_is_named(box, tmp_path, name, shape):
 def test_a_path_of_an_asset_shows_the_asset(cow, tmp_path):
     cow.save(tmp_path / "cow.bvh")
     assert np.array_equal(tandem.view(tmp_path / "cow.bvh", off_screen=True, size=SIZE), tandem.view(cow, off_screen=True, size=SIZE))
-
-
-def command(*arguments):
-    return subprocess.run([sys.executable, "-m", "tandem", *map(os.fspath, arguments)], capture_output=True, text=True)
 
 
 def test_the_command_writes_the_picture_that_view_makes(box, tmp_path):

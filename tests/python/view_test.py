@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 # Where nothing draws, this skips all that follows.
-from pictures import RED, SIZE, SOURCE_DIR, TURNED, around, body_of_pixels, box, command, grown, h5py, hue_distance, hues, inner, is_backdrop, projected, render, write_run
+from pictures import RED, SIZE, SOURCE_DIR, TURNED, body_of_pixels, box, command, grown, h5py, hue_distance, hues, inner, is_backdrop, projected, render, write_run
 
 import matplotlib
 import matplotlib.image
 
 import tandem
-from meshes import BOX_FACES, BOX_VERTICES, read_obj
+from meshes import BOX_VERTICES, read_obj
 from tandem import scene_files, tree, viewer
 
 

@@ -185,6 +185,11 @@ std::vector<ContactImpulse> ContactCache::impulses() const {
   return impulses;
 }
 
+void ContactCache::restore(std::vector<CachedContact> entries) {
+  entries_ = std::move(entries);
+  contacts_.clear(), place_.clear();
+}
+
 void ContactCache::remember(std::span<const ContactImpulse> impulses) {
   for (std::size_t i = 0; i < impulses.size(); ++i) {
     CachedContact& entry = entries_[place_[i]];

@@ -60,7 +60,9 @@ class ContactCache {
   void remember(std::span<const ContactImpulse> impulses);
 
   std::span<const CachedContact> entries() const { return entries_; }
-  void restore(std::vector<CachedContact> entries) { entries_ = std::move(entries); }
+
+  /// Remembers these contacts instead. contacts() are none until the next update().
+  void restore(std::vector<CachedContact> entries);
 
  private:
   // Makes the contacts of a pair that moved of those found and those just lost.

@@ -8,6 +8,11 @@
 namespace tandem::dynamics {
 namespace {
 
+// It is false of NaN.
+bool is_within(const Vector3& x, double most) {
+  return std::fabs(x.x) <= most && std::fabs(x.y) <= most && std::fabs(x.z) <= most;
+}
+
 Vector3 turn_into_world(const Quaternion& orientation, const Matrix3& tensor, const Vector3& vector) {
   const Matrix3 rotation = matrix_of(orientation);
   return rotation * (tensor * (transposed(rotation) * vector));
@@ -83,10 +88,13 @@ double default_slop(std::span<const AssetView> shapes, std::span<const BodyPrope
 }
 
 bool is_usable(const BodyState& state) {
-  const Vector3& x = state.position;
-  const double most = std::max({std::fabs(x.x), std::fabs(x.y), std::fabs(x.z)});
-  return is_finite(x) && most <= kLargestWorldCoordinate && std::isfinite(state.orientation.w) &&
-         is_finite(state.velocity) && is_finite(state.angular_velocity);
+  return is_within(state.position, kLargestWorldCoordinate) && std::isfinite(state.orientation.w) &&
+         is_within(state.velocity, kFastest) && is_within(state.angular_velocity, kFastest);
+}
+
+bool is_usable_mass(double mass) {
+  constexpr double kMost = 1e30;
+  return mass >= 1 / kMost && mass <= kMost;
 }
 
 Instance pose_of(const BodyProperties& body, const BodyState& state) {

@@ -67,8 +67,17 @@ BodyProperties of_density(BodyProperties body, double density);
 /// of a moving body's shape; without such bodies that of a shape of 2 m.
 double default_slop(std::span<const AssetView> shapes, std::span<const BodyProperties> bodies);
 
-/// Returns whether a step can start from a state: all numbers are finite, and places such as queries take.
+/// The fastest that a body may move or turn along an axis, in m/s and rad/s. From about 1e11 on, rounding
+/// takes what gravity adds in a step to the bodies that Newton's method solves with such a body.
+inline constexpr double kFastest = 1e10;
+
+/// Returns whether a step can start from a state: all numbers are finite, places are such as queries take,
+/// and nothing is faster than kFastest.
 bool is_usable(const BodyState& state);
+
+/// Returns whether a step can move a body of this mass, in kg: products of three of its moments of inertia
+/// are numbers.
+bool is_usable_mass(double mass);
 
 /// Returns where a question is to see the body: x_world = rotation * x_file + translation.
 Instance pose_of(const BodyProperties& body, const BodyState& state);

@@ -72,7 +72,7 @@ Status check(const WorldOptions& options) {
 
 bool is_usable_start(const BodyDescription& body, const BodyState& state) {
   const Material& material = body.material;
-  return is_usable(state) && std::isfinite(body.gravity_scale) && material.friction <= kMost &&
+  return is_usable(state) && is_option(body.gravity_scale, -kMost, kMost) && material.friction <= kMost &&
          material.restitution <= 1 && material.rolling_resistance <= kMost;
 }
 
@@ -109,7 +109,7 @@ class Masses {
     const Motion motion = body.motion;
     body = of_density(*of_[from.asset], from.density);
     body.motion = motion;
-    return Status::kOk;
+    return is_usable_mass(body.mass) ? Status::kOk : Status::kOutOfRange;
   }
 
  private:
@@ -395,7 +395,8 @@ Status World::set_force(std::uint32_t body, const double (&force)[3], const doub
   if (body >= bodies().size()) return fail(Status::kUnknownInstance, body);
   if (parts_->simulation->bodies()[body].motion != Motion::moving) return fail(Status::kOk);
   const BodyForce to = {vector_of(force), vector_of(torque)};
-  if (!is_finite(to.force) || !is_finite(to.torque)) return fail(Status::kOutOfRange, body);
+  const Pull pull = pull_on(parts_->simulation->bodies()[body], parts_->simulation->states()[body], {}, to);
+  if (!(pull.most() <= kFastest)) return fail(Status::kOutOfRange, body);
   try {
     parts_->simulation->set_force(body, to);
   } catch (const std::bad_alloc&) {

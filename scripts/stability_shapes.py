@@ -1,7 +1,13 @@
 """Closed meshes that scripts/stability makes: arrays of vertices and of triangles, which wind counterclockwise seen from outside. Lengths are metres."""
 import functools
+import sys
 
 import numpy as np
+
+from common import tools
+
+sys.path.append(str(tools.ROOT / "docs/examples"))
+from shapes import around, lofted, thread, turned  # noqa: E402
 
 GAP = 3e-4  # between bowls of which each lies in the next
 FOOT = 0.14  # radians: the half-angle of a bowl's flat bottom
@@ -16,30 +22,6 @@ BOLT, NUT, THIN_NUT = 2.5, 0.3, 0.02  # heights
 
 def obj_of(vertices, triangles):
     return "".join(f"v {x!r} {y!r} {z!r}\n" for x, y, z in vertices.tolist()) + "".join(f"f {a} {b} {c}\n" for a, b, c in (triangles + 1).tolist())
-
-
-def lofted(loops):
-    """Joins closed loops [loop, point, 3], each with the next. Points at one place become one vertex, so a loop may be a point, and the last be the first again."""
-    loops = np.asarray(loops, float)
-    count, points = loops.shape[:2]
-    vertices, at = np.unique(loops.reshape(-1, 3).round(12) + 0.0, axis=0, return_inverse=True)
-    grid = at.reshape(count, points)
-    below, above = grid[:-1], grid[1:]
-    corners = [below, np.roll(below, -1, axis=1), np.roll(above, -1, axis=1), above]
-    triangles = np.concatenate([np.stack([corners[i] for i in three], axis=-1).reshape(-1, 3) for three in ((0, 1, 2), (0, 2, 3))])
-    a, b, c = triangles.T
-    return vertices, triangles[(a != b) & (b != c) & (c != a)]
-
-
-def around(angles, radii, height):
-    """A loop about the z axis."""
-    return np.stack(np.broadcast_arrays(radii * np.cos(angles), radii * np.sin(angles), height), axis=-1)
-
-
-def revolved(profile, segments):
-    """Turns a profile of (radius, height) about the z axis: closed, or from the axis, outside first, to the axis."""
-    angles = 2 * np.pi * np.arange(segments) / segments
-    return lofted([around(angles, radius, height) for radius, height in profile])
 
 
 def sphere(radius, subdivisions):
@@ -62,7 +44,7 @@ def sphere(radius, subdivisions):
 
 def ring():
     angles = 2 * np.pi * np.arange(25) / 24
-    return revolved(np.stack([RING + WIRE * np.cos(angles), WIRE * np.sin(angles)], axis=1), 48)
+    return turned(np.stack([RING + WIRE * np.cos(angles), WIRE * np.sin(angles)], axis=1), 48, closed=False)
 
 
 def bowl_profile(radius):
@@ -73,40 +55,35 @@ def bowl_profile(radius):
 def bowl(radius):
     """Half a spherical shell with a flat bottom; the sphere's centre is the origin."""
     outside, inside = bowl_profile(radius), bowl_profile(radius - WALL)
-    return revolved([(0, outside[0, 1]), *outside, *inside[::-1], (0, inside[0, 1])], 48)
+    return turned([(0, outside[0, 1]), *outside, *inside[::-1], (0, inside[0, 1])], 48, closed=False)
 
 
 def coin():
     radius, half = COIN
-    return revolved([(0, -half), (radius, -half), (radius, half), (0, half)], 1024)
+    return turned([(0, -half), (radius, -half), (radius, half), (0, half)], 1024, closed=False)
 
 
 def top():
     """A disc on a stem that ends in a point, the origin."""
-    return revolved([(0, 0), (0.04, 0.04), (0.04, 0.12), (0.25, 0.12), (0.25, 0.18), (0, 0.18)], 96)
+    return turned([(0, 0), (0.04, 0.04), (0.04, 0.12), (0.25, 0.12), (0.25, 0.18), (0, 0.18)], 96, closed=False)
 
 
 # A thread is a cross-section of three lobes, turned as it rises.
 LOBES, CORE, LOBE, AROUND = 3, 0.1, 0.02, 96
 
 
-def thread(heights, play=0.0):
-    angles = 2 * np.pi * np.arange(AROUND) / AROUND
-    radii = CORE + play + LOBE * np.cos(LOBES * angles)
-    return [around(angles + 2 * np.pi * z / LEAD, radii, z) for z in heights]
-
-
-def thread_heights(height):
-    return np.arange(round(height / LEAD * AROUND) + 1) * LEAD / AROUND
+def lobed(height, play=0.0):
+    heights = np.arange(round(height / LEAD * AROUND) + 1) * LEAD / AROUND
+    return thread(heights, LEAD, CORE + play, LOBE, LOBES, AROUND)
 
 
 def bolt():
-    loops = thread(thread_heights(BOLT))
+    loops = lobed(BOLT)
     return lofted([0 * loops[0], *loops, 0 * loops[-1] + [0, 0, loops[-1][0, 2]]])
 
 
 def nut(height):
-    inside = thread(thread_heights(height), PLAY)
+    inside = lobed(height, PLAY)
     outside = [around(np.arctan2(loop[:, 1], loop[:, 0]), 0.2, loop[:, 2]) for loop in inside]
     return lofted([*outside, *inside[::-1], outside[0]])
 
@@ -133,6 +110,6 @@ def gear():
 
 
 SHAPES = {"ring": ring, "coin": coin, "top": top, "bolt": bolt, "nut": functools.partial(nut, NUT), "thin_nut": functools.partial(nut, THIN_NUT), "gear": gear,
-          "pin": functools.partial(revolved, [(0, -0.1), (PIN, -0.1), (PIN, 0.3), (0, 0.3)], 200)}
+          "pin": functools.partial(turned, [(0, -0.1), (PIN, -0.1), (PIN, 0.3), (0, 0.3)], 200, closed=False)}
 SHAPES |= {f"sphere_{20 * 4 ** n}": functools.partial(sphere, 0.5, n) for n in (3, 5, 6)}
 SHAPES |= {f"bowl_{i}": functools.partial(bowl, BOWL - i * (WALL + GAP)) for i in range(10)}

@@ -9,27 +9,36 @@ def box(size, centre=(0, 0, 0)):
     return corners * size + centre, np.array(triangles)
 
 
+def around(angles, radii, heights):
+    """Points about the z axis, such as a loop."""
+    return np.stack(np.broadcast_arrays(radii * np.cos(angles), radii * np.sin(angles), heights), axis=-1)
+
+
+def lofted(loops):
+    """Joins closed loops (k, n, 3), each with the next. Points at one place become one vertex, so a loop may be a point, and the last be the first again."""
+    loops = np.asarray(loops, float)
+    vertices, at = np.unique(loops.reshape(-1, 3).round(12) + 0.0, axis=0, return_inverse=True)
+    grid = at.reshape(loops.shape[:2])
+    below, above = grid[:-1], grid[1:]
+    corners = [below, np.roll(below, -1, axis=1), np.roll(above, -1, axis=1), above]
+    triangles = np.concatenate([np.stack([corners[i] for i in three], axis=-1).reshape(-1, 3) for three in ((0, 1, 2), (0, 2, 3))])
+    different = (triangles != np.roll(triangles, 1, axis=1)).all(axis=1)
+    return vertices, triangles[different]
+
+
 def turned(profile, sides, closed=True):
     """A profile (k, 2) of radii and heights turned about z. It runs anticlockwise; closed: its end joins its start, as
     that of a ring; else both ends lie on the axis, as those of a rod."""
-    angle = 2 * np.pi * np.arange(sides) / sides
-    around = np.stack([np.cos(angle), np.sin(angle)], 1)
-    radius, height = np.array(profile, float).T
-    rings = np.concatenate([radius[:, None, None] * around, np.broadcast_to(height[:, None, None], (len(radius), sides, 1))], 2)
-    start = np.arange(len(profile) if closed else len(profile) - 1)
-    low, side = np.meshgrid(start, np.arange(sides), indexing="ij")
-    high, beside = (low + 1) % len(profile), (side + 1) % sides
-    a, b, c, d = (row * sides + column for row, column in ((low, side), (low, beside), (high, beside), (high, side)))
-    triangles = np.stack([np.stack([a, b, c], -1), np.stack([a, c, d], -1)]).reshape(-1, 3)
-    return joined(rings.reshape(-1, 3), triangles)
+    angles = 2 * np.pi * np.arange(sides) / sides
+    radii, heights = np.array([*profile, *profile[:1]] if closed else profile, float).T[..., None]
+    return lofted(around(angles, radii, heights))
 
 
-def joined(vertices, triangles):
-    """The same with one vertex for each place, and without triangles that have two corners in one place."""
-    vertices, row = np.unique(vertices.round(12) + 0.0, axis=0, return_inverse=True)
-    triangles = row.reshape(-1)[triangles]
-    different = (triangles != np.roll(triangles, 1, axis=1)).all(axis=1)
-    return vertices, triangles[different]
+def thread(heights, lead, radius, depth, lobes=3, sides=96):
+    """Loops for `lofted`, one at each height: a cross-section whose radius goes up and down by `depth` at each of its lobes, turned by 360 degrees a lead."""
+    angles = 2 * np.pi * np.arange(sides) / sides
+    radii = radius + depth * np.cos(lobes * angles)
+    return [around(angles + 2 * np.pi * height / lead, radii, height) for height in heights]
 
 
 def rod(radius, length, sides=24):
@@ -40,6 +49,17 @@ def rod(radius, length, sides=24):
 def ring(outer, inner, height, sides=32):
     """A tube about z, from z = 0."""
     return turned([(inner, 0), (outer, 0), (outer, height), (inner, height)], sides)
+
+
+def tube(path, radius, sides=24):
+    """A rod along points (k, 3) of a plane across the y axis."""
+    path = np.array(path, float)
+    along = np.gradient(path, axis=0)
+    across = np.cross([0, -1, 0], along / np.linalg.norm(along, axis=1, keepdims=True))
+    angles = 2 * np.pi * np.arange(sides)[:, None] / sides
+    loops = path[:, None] + radius * (np.cos(angles) * across[:, None] - np.sin(angles) * [0, 1, 0])
+    ends = np.broadcast_to(path[[0, -1], None], (2, *loops.shape[1:]))
+    return lofted([ends[0], *loops, ends[1]])
 
 
 def torus(radius, thickness, sides=48, around=24):

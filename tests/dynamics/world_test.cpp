@@ -1,61 +1,15 @@
-#include "tandem/dynamics/world.h"
-
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
-#include "kernels/manifold/manifold_scene.h"
+#include "dynamics/world_on_ground.h"
 
 /// Bodies that move, beside closed forms.
 namespace tandem::test {
 namespace {
 
-constexpr double kStep = 1.0 / 60, kGravity = 9.81;
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-
 double mean(const double (&x)[3]) {
   return (x[0] + x[1] + x[2]) / 3;
 }
-
-// A ground whose upper side is z = 0, and bodies above it.
-class WorldOnGround {
- public:
-  explicit WorldOnGround(const Mesh& mesh) {
-    assets_.add(box(40, 40, 2));
-    assets_.add(mesh);
-    add(shift(0, 0, -1)).filter.motion = Motion::fixed;
-    bodies.back().asset = 0;
-  }
-  BodyDescription& add(const Pose& pose) {
-    BodyDescription& body = bodies.emplace_back();
-    body.asset = 1, body.pose = pose;
-    return body;
-  }
-  World& begin(const WorldOptions& options = {}) {
-    EXPECT_EQ(world.set_assets(assets_.views()), Status::kOk);
-    EXPECT_EQ(world.set_bodies(bodies, options), Status::kOk);
-    return world;
-  }
-  double fastest() const {
-    double most = 0;
-    for (const BodyMotion& body : world.bodies()) most = std::max(most, norm(vector_of(body.velocity)));
-    return most;
-  }
-  double kinetic_energy() const {
-    double sum = 0;
-    for (std::uint32_t i = 0; i < world.bodies().size(); ++i) {
-      const Vector3 v = vector_of(world.bodies()[i].velocity);
-      sum += 0.5 * world.mass_of(i) * dot(v, v);
-    }
-    return sum;
-  }
-
-  std::vector<BodyDescription> bodies;
-  World world;
-
- private:
-  SampleAssets assets_;
-};
 
 TEST(World, ABodyFallsAsGalileiSays) {
   WorldOnGround scene(box(1, 1, 1));
@@ -361,49 +315,6 @@ TEST(World, GoesBackToWhatWasSavedAndDoesNotDependOnThreads) {
     ASSERT_EQ(world.set_bodies(scene.bodies), Status::kOk);
     EXPECT_EQ(world.restore(*state), Status::kKeptMismatch);
   }
-}
-
-TEST(World, RefusesWhatItCannotMove) {
-  WorldOnGround scene(box(1, 1, 1));
-  scene.add(shift(0, 0, 5));
-  World& world = scene.begin();
-  const auto refused = [&](const auto& change, Status expected) {
-    std::vector<BodyDescription> bodies = scene.bodies;
-    change(bodies[1]);
-    EXPECT_EQ(world.set_bodies(bodies), expected);
-    EXPECT_EQ(world.where(), 1u);
-    EXPECT_TRUE(world.bodies().empty());
-  };
-  refused([](BodyDescription& body) { body.asset = 2; }, Status::kUnknownAsset);
-  refused([](BodyDescription& body) { body.pose.rotation[0][0] = 2; }, Status::kPoseNotRigid);
-  refused([](BodyDescription& body) { body.density = 0; }, Status::kNoMass);
-  refused([](BodyDescription& body) { body.density = kNan; }, Status::kNoMass);
-  refused([](BodyDescription& body) { body.velocity[1] = kNan; }, Status::kOutOfRange);
-  refused([](BodyDescription& body) { body.gravity_scale = kNan; }, Status::kOutOfRange);
-  refused([](BodyDescription& body) { body.material.friction = kNan; }, Status::kOutOfRange);
-  refused([](BodyDescription& body) { body.material.restitution = 1.1; }, Status::kOutOfRange);
-  refused([](BodyDescription& body) { body.material.rolling_resistance = 2e6; }, Status::kOutOfRange);
-  for (const WorldOptions& options :
-       {WorldOptions{.friction = -1}, WorldOptions{.restitution = 1.1}, WorldOptions{.slop = kNan},
-        WorldOptions{.substeps = 0}, WorldOptions{.threads = 0}, WorldOptions{.gravity = {0, kNan, 0}}})
-    EXPECT_EQ(world.set_bodies(scene.bodies, options), Status::kBadOption);
-  ASSERT_EQ(world.set_bodies(scene.bodies), Status::kOk);
-  for (const double dt : {0.0, -1.0, kNan, 1001.0}) EXPECT_EQ(world.step(dt), Status::kBadDuration);
-  EXPECT_EQ(world.set(2, world.bodies()[1]), Status::kUnknownInstance);
-  EXPECT_EQ(world.push(9, {1, 0, 0}, {0, 0, 0}), Status::kUnknownInstance);
-  EXPECT_EQ(world.set_force(9, {1, 0, 0}, {0, 0, 0}), Status::kUnknownInstance);
-  EXPECT_EQ(world.set_force(1, {0, 0, 0}, {kNan, 0, 0}), Status::kOutOfRange);
-  EXPECT_EQ(world.push(1, {kNan, 0, 0}, {0, 0, 0}), Status::kOutOfRange);
-  EXPECT_EQ(world.step(kStep), Status::kOk);
-}
-
-TEST(World, WhatLeavesTheRangeOfNumbersIsToldAndTheRestStaysAsItWas) {
-  WorldOnGround scene(box(1, 1, 1));
-  scene.add(shift(0, 0, 5)).velocity[2] = 1e300;
-  World& world = scene.begin({.sleeping = false});
-  EXPECT_EQ(world.step(1000, 100), Status::kOutOfRange);
-  EXPECT_EQ(world.where(), 1u);
-  EXPECT_TRUE(std::isfinite(world.bodies()[1].centre[2]));
 }
 
 }  // namespace

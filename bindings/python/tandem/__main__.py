@@ -3,6 +3,7 @@
     python -m tandem view scene.h5 --manifolds
     python -m tandem view run.h5 --step 120 -o step.png
     python -m tandem view cow.bvh --tree-depth 3
+    python -m tandem view scene.h5 --simulate
     python -m tandem info cow.bvh
 """
 from __future__ import annotations
@@ -16,7 +17,7 @@ import tandem
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Runs a command. Returns the exit code: 0 done, 1 usage, 2 input cannot be read, or nothing to draw on."""
+    """Runs a command. Returns the exit code: 0 done, 1 usage, 2 input cannot be read, or nothing to draw on, 130 Ctrl-C."""
     options = _parser().parse_args(arguments)
     try:
         options.run(options)
@@ -26,6 +27,8 @@ def main(arguments: list[str] | None = None) -> int:
     except (OSError, RuntimeError, ValueError, tandem.Error) as error:
         print(f"tandem: {error}", file=sys.stderr)
         return 2
+    except KeyboardInterrupt:
+        return 130
     return 0
 
 
@@ -48,7 +51,10 @@ def _parser() -> argparse.ArgumentParser:
     view.add_argument("--color", choices=("body", "asset", "level"), default="body",
                       help="what has a colour of its own (default: body)")
     view.add_argument("--opacity", type=float, help="of the bodies, 0 to 1")
-    view.add_argument("--step", type=int, help="of a run: steps made before the state (default: the last)")
+    view.add_argument("--step", type=int, help="of a run: steps made before the state (default: the last); with --simulate: to be made before")
+    view.add_argument("--simulate", action="store_true", help="the bodies of a scene file move: space stops them, right makes one step, "
+                      "Home goes back")
+    view.add_argument("--dt", type=seconds, help="with --simulate: length of a step, such as 1/120 (default: 1/60)")
     view.add_argument("--azimuth", type=float, default=-60, help="degrees; 0 from +x, 90 from +y (default: -60)")
     view.add_argument("--elevation", type=float, default=24, help="degrees above the horizon (default: 24)")
     view.add_argument("--width", type=int, default=900, help="in pixels (default: 900)")
@@ -60,10 +66,33 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
+def seconds(word: str) -> float:
+    """A number or a quotient of two."""
+    parts = [float(part) for part in word.split("/")]
+    if len(parts) > 2 or 0 in parts[1:]:
+        raise ValueError(word)
+    return parts[0] / (parts[1] if len(parts) == 2 else 1)
+
+
 def _view(options: argparse.Namespace) -> None:
-    tandem.view(options.file, picture=options.output, contacts=options.contacts, manifolds=options.manifolds,
+    what, live, step = options.file, {}, options.step
+    if options.simulate:
+        what, live, step = _world(options.file), {"dt": 1 / 60 if options.dt is None else options.dt}, None
+        what.step(live["dt"], options.step or 0)
+    elif options.dt is not None:
+        raise ValueError("--dt belongs to --simulate")
+    tandem.view(what, picture=options.output, contacts=options.contacts, manifolds=options.manifolds,
                 levels=options.level, tree_depth=options.tree_depth, color=options.color, opacity=options.opacity,
-                step=options.step, azimuth=options.azimuth, elevation=options.elevation, size=(options.width, options.height))
+                step=step, azimuth=options.azimuth, elevation=options.elevation, size=(options.width, options.height), **live)
+
+
+def _world(path: pathlib.Path) -> tandem.World:
+    try:
+        from tandem import scene_files
+
+        return scene_files.world(path)
+    except ModuleNotFoundError as error:
+        raise ImportError("--simulate needs h5py: pip install '.[view]' in the folder of the sources") from error
 
 
 def _info(options: argparse.Namespace) -> None:

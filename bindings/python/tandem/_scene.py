@@ -112,7 +112,7 @@ class Filter:
     [(0, 2), (1, 2)]
     """
 
-    __slots__ = ("_core",)
+    __slots__ = ("_core", "_motion")
 
     def __init__(self, motion: npt.ArrayLike | None = None, group: npt.ArrayLike | None = None, mask: npt.ArrayLike | None = None,
                  excluded: npt.ArrayLike | None = None):
@@ -124,6 +124,7 @@ class Filter:
             if len(shape) != 1 or shape != next(iter(shapes.values())):
                 raise ValueError(f"{name} has shape {shape} where (n,) is wanted, the same as of the others")
         self._core = _tandem.Filter(motions, groups, masks, pairs_of(excluded, "excluded"))
+        self._motion = None if motions is None else motions.copy()
 
 
 def _core_of(filter: Filter | None) -> _tandem.Filter | None:

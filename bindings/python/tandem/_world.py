@@ -113,6 +113,14 @@ def _of_world(value: npt.ArrayLike | None, name: str, most: float, default: Any)
     return (default, value) if np.ndim(value) > 0 else (amount(value, name, most), None)
 
 
+def duration(dt: float) -> float:
+    """The length of a step."""
+    seconds = number(dt, "dt")
+    if not 0 < seconds <= 1000:
+        raise ValueError(f"dt is {seconds} where more than 0 and at most 1000 is wanted")
+    return seconds
+
+
 def _material(value: npt.ArrayLike | None, name: str, bodies: int, most: float = _MOST) -> _Numbers | None:
     given = _of_each(value, name, bodies)
     if given is not None and not (given <= most).all():
@@ -148,7 +156,7 @@ class World:
     ([0.25, 0.0, 1.0], [False, True])
     """
 
-    __slots__ = ("_asset", "_core", "__weakref__")
+    __slots__ = ("_asset", "_assets", "_core", "_filter", "__weakref__")
 
     def __init__(self, assets: Iterable[Asset], instances: Rows | None = None, *, filter: Filter | None = None, asset: npt.ArrayLike | None = None,
                  rotation: Rotations | None = None, translation: npt.ArrayLike | None = None, transform: npt.ArrayLike | None = None,
@@ -159,10 +167,14 @@ class World:
         world_friction, frictions = _of_world(friction, "friction", _MOST, 0.5)
         world_restitution, restitutions = _of_world(restitution, "restitution", 1.0, 0.0)
         world_lever, levers = _of_world(rolling_resistance, "rolling_resistance", _MOST, None)
+        if not isinstance(assets, Asset):  # which cores_of() refuses
+            assets = list(assets)
         self._core = _tandem.World(
             cores_of(assets), _gravity(gravity), world_friction, world_restitution, None if slop is None else amount(slop, "slop", _MOST),
             world_lever, whole_number(substeps, "substeps", 1, 10_000), flag(sleeping, "sleeping"), flag(continuous, "continuous"), whole_number(threads, "threads", 1, 1024))
+        self._assets = list(assets)
         self._asset = np.zeros(0, np.uint32)
+        self._filter: Filter | None = None
         if not (instances is None and asset is None and rotation is None and translation is None and transform is None):
             self.place(instances, filter=filter, asset=asset, rotation=rotation, translation=translation, transform=transform, density=density, velocity=velocity,
                        angular_velocity=angular_velocity, friction=frictions, restitution=restitutions, rolling_resistance=levers, gravity_scale=gravity_scale, joints=joints)
@@ -188,8 +200,8 @@ class World:
             joints: between these bodies, and with the world.
 
         Raises:
-            Error: as of `Scene.place`; a velocity or gravity_scale that is not finite; a moving body whose mesh has no topology or no extent, or whose density is not positive; a
-                joint of a body that there is not, of two that nothing moves, without an axis, or with numbers that its kind cannot have. There are no bodies then.
+            Error: as of `Scene.place`; a velocity beyond 1e10 along an axis, a mass that is not from 1e-30 to 1e30 kg, or a gravity_scale beyond 1e6; a moving body whose
+                mesh has no topology or no extent, or whose density is not positive; a joint of a body that there is not, of two that nothing moves, without an axis, or with numbers that its kind cannot have. There are no bodies then.
         """
         bodies = instances_of(instances, asset, rotation, translation, transform)
         given = (_of_each(density, "density", len(bodies)), _of_each(velocity, "velocity", len(bodies), 3),
@@ -197,24 +209,21 @@ class World:
                  _material(restitution, "restitution", len(bodies), 1.0), _material(rolling_resistance, "rolling_resistance", len(bodies)),
                  _of_each(gravity_scale, "gravity_scale", len(bodies)))
         joined = _joint_rows(joints)
-        self._asset = np.zeros(0, np.uint32)
+        self._asset, self._filter = np.zeros(0, np.uint32), None
         try:
             self._core.set_bodies(bodies, _core_of(filter), *given, joined)
         except Error as error:
             raise explained(error, bodies) from None
-        self._asset = bodies["asset"].copy()
+        self._asset, self._filter = bodies["asset"].copy(), filter
         return self
 
     def step(self, dt: float, steps: int = 1) -> None:
         """Makes steps of dt seconds, from more than 0 to 1000. Ctrl-C, and an error, leave the bodies as after the last step that was whole.
 
         Raises:
-            Error: a body has left the range of numbers that questions take; `where` is the body.
+            Error: a body has left the range of numbers that questions take, or has become faster than `place` allows; `where` is the body. There are no contacts then.
         """
-        duration = number(dt, "dt")
-        if not 0 < duration <= 1000:
-            raise ValueError(f"dt is {duration} where more than 0 and at most 1000 is wanted")
-        self._core.step(duration, whole_number(steps, "steps", 0, 2**63))
+        self._core.step(duration(dt), whole_number(steps, "steps", 0, 2**63))
 
     def move(self, body: int, *, rotation: Rotations | None = None, translation: npt.ArrayLike | None = None, transform: npt.ArrayLike | None = None,
              velocity: npt.ArrayLike | None = None, angular_velocity: npt.ArrayLike | None = None) -> None:
@@ -333,6 +342,22 @@ class World:
         """(n,), which bodies rest with all that they touch, and are not looked at until they are touched."""
         sleeps: npt.NDArray[np.bool_] = self.bodies["sleeps"] != 0
         return sleeps
+
+    @property
+    def assets(self) -> list[Asset]:
+        """The assets that bodies refer to."""
+        return list(self._assets)
+
+    @property
+    def filter(self) -> Filter | None:
+        """What the bodies were placed with: what moves them, and which of them meet; joints beside."""
+        return self._filter
+
+    @property
+    def motion(self) -> npt.NDArray[np.uint8]:
+        """(n,), what moves each body, as of `Filter`; MOVING where nothing was said."""
+        given = None if self._filter is None else self._filter._motion
+        return np.zeros(len(self._asset), np.uint8) if given is None else given.copy()
 
     @property
     def instances(self) -> Rows:

@@ -47,6 +47,36 @@ def at_levels(assets: list[tandem.Asset], asset: NDArray[Any], level: NDArray[An
     return shown, row.reshape(-1).astype(np.uint32)
 
 
+def scene_of(world: tandem.World) -> Scene:
+    """The bodies of a world as they are."""
+    bodies = world.instances
+    return Scene(world.assets, bodies["asset"], np.zeros(len(bodies), np.uint32), world.motion, np.zeros(1, np.int64), bodies["rotation"][None],
+                 bodies["translation"][None], filter=world.filter)
+
+
+def world(path: str | os.PathLike[str], **options: Any) -> tandem.World:
+    """Makes the world of a scene file, with its densities and velocities. Bodies are at their levels of detail, with the masses of these.
+
+    options: those of tandem.World, such as friction.
+
+    Raises what read() and tandem.World raise, and ValueError for what is no scene file.
+    """
+    import h5py
+
+    path = pathlib.Path(path)
+    if path.suffix == ".bvh":
+        raise ValueError(f"{path}: is an asset; a world is made of a scene file")
+    scene = read(path)
+    with h5py.File(path) as file:
+        if "bodies" in file:
+            raise ValueError(f"{path}: is a run; bvhbench frame makes a scene file of one of its states")
+        count = len(scene.asset)
+        start = {name: _dataset(path, file, f"simulation/{name}", count, *shape)
+                 for name, shape in (("density", ()), ("velocity", (3,)), ("angular_velocity", (3,))) if f"simulation/{name}" in file}
+    assets, asset = at_levels(scene.assets, scene.asset, scene.level)
+    return tandem.World(assets, asset=asset, rotation=scene.rotation[0], translation=scene.translation[0], filter=scene.filter, **start, **options)
+
+
 def read(path: str | os.PathLike[str]) -> Scene:
     """Reads a scene file, or a run file with its states, and the assets that it names.
 

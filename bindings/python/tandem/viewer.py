@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 import tandem
 from tandem import tree
-from tandem.scene_files import Scene, at_levels, read
+from tandem.scene_files import Scene, at_levels, read, scene_of
 
 # matplotlib and vtk have no types, and what pyvista's decorators make of its own says nothing to mypy.
 matplotlib: Any = importlib.import_module("matplotlib")
@@ -47,16 +47,23 @@ def view(what: Any, instances: NDArray[np.void] | None = None, *, picture: str |
     """Shows bodies and what was found of them.
 
     what: the path of a scene file, of a run with states or of a .bvh file, an asset, or assets, to which `instances`
-        belong (tandem.instances()). With pictures of an asset alone it stands at the origin.
+        belong (tandem.instances()); or a tandem.World, which goes on in the window (tandem.live_view.LiveView), and
+        stays as it is where no window opens. With pictures of an asset alone it stands at the origin.
     picture: path of a .png file to write; no window opens.
     off_screen: no window opens; needs neither a display nor a GPU.
     options: those of tandem.viewer.View: contacts, manifolds, distances, levels, motion, step, tree_depth, color,
-        opacity, size, azimuth, elevation.
+        opacity, size, azimuth, elevation; of a world also those of LiveView.
 
     Returns the picture where no window opens, uint8 (height, width, 3); else None once the window is closed.
     """
     hidden = off_screen or picture is not None
-    shown = View(what, instances, off_screen=hidden, **options)
+    shown: View
+    if isinstance(what, tandem.World):
+        from tandem.live_view import LiveView
+
+        shown = LiveView(what, off_screen=hidden, **options)
+    else:
+        shown = View(what, instances, off_screen=hidden, **options)
     try:
         if hidden:
             return shown.picture(picture)
@@ -255,12 +262,21 @@ class View:
         body = np.flatnonzero(self._subject)
         corners = self._bounds[self._asset[body]]
         seen = np.concatenate([self._posed(body, corners, state).reshape(-1, 3) for state in states]) @ axes.T
+        self._frame(axes, seen)
+
+    def _cone(self) -> tuple[Points, Points]:
+        """Returns the least and greatest slopes, across and upwards, of rays from the eye that hit the picture, left of the bars."""
         width, height = self.plotter.window_size
         whole = np.tan(np.radians(VIEW_ANGLE / 2)) * np.array([width / height, 1])
         low, high = -whole * (1 - 2 * MARGIN), whole * (1 - 2 * MARGIN)
         # A run may have contact points at another of its states, and a bar then.
         bars = len(self.plotter.scalar_bars) if len(self.scene.steps) == 1 else int(self._manifolds is not False)
         high[0] -= 2 * whole[0] * BAR * bars
+        return low, high
+
+    def _frame(self, axes: Points, seen: Points) -> None:
+        """Puts the camera as near as all points (n, 3), along its axes (right, up, back), are in the picture."""
+        low, high = self._cone()
         # The eye is the nearest place behind everything from which all points lie in the cone of the view. Across, it
         # is where the cones that touch the points on either side meet.
         most, least = (seen[:, :2] + seen[:, 2:] * high).max(axis=0), (seen[:, :2] + seen[:, 2:] * low).min(axis=0)
@@ -412,7 +428,9 @@ class View:
 def _scene(what: Any, instances: NDArray[np.void] | None) -> Scene:
     if isinstance(what, Scene):
         return what
-    if isinstance(what, (str, os.PathLike)):
+    if isinstance(what, tandem.World):
+        scene = scene_of(what)
+    elif isinstance(what, (str, os.PathLike)):
         scene = _scene(tandem.Asset.load(what), instances) if os.fspath(what).endswith(".bvh") else read(what)
     else:
         assets = [what] if isinstance(what, tandem.Asset) else list(what)

@@ -862,18 +862,19 @@ typedef struct tandem_body_start {
 
 /// Places all bodies anew, at time 0. filter: or null; a sleeping body starts awake. start: or null. Result:
 /// as of tandem_scene_place(); also, where tandem_world_where() is the body, TANDEM_OUT_OF_RANGE of a
-/// velocity or gravity_scale that is not finite, or of a friction, restitution or rolling resistance that is
-/// larger than options may be, and TANDEM_NO_MASS where a moving body's mesh has no extent or its density is
-/// not positive; TANDEM_NO_TOPOLOGY, where it is the asset; and where it is the joint,
-/// TANDEM_UNKNOWN_INSTANCE, TANDEM_JOINS_NOTHING, TANDEM_NO_AXIS and, of numbers that its kind cannot have,
-/// TANDEM_BAD_JOINT. After an error there are no bodies.
+/// velocity beyond 1e10 along an axis, a mass that is not from 1e-30 to 1e30 kg, a gravity_scale beyond 1e6,
+/// or a friction, restitution or rolling resistance that is larger than options may be, and TANDEM_NO_MASS
+/// where a moving body's mesh has no extent or its density is not positive; TANDEM_NO_TOPOLOGY, where it is
+/// the asset; and where it is the joint, TANDEM_UNKNOWN_INSTANCE, TANDEM_JOINS_NOTHING, TANDEM_NO_AXIS and,
+/// of numbers that its kind cannot have, TANDEM_BAD_JOINT. After an error there are no bodies.
 TANDEM_API tandem_status tandem_world_set_bodies(tandem_world* world, const tandem_instance* instances,
                                                  size_t count, const tandem_pair_filter* filter,
                                                  const tandem_body_start* start);
 
 /// Makes steps of dt seconds. Result: TANDEM_BAD_DURATION where dt is not more than 0 or more than 1000;
 /// TANDEM_OUT_OF_RANGE, where tandem_world_where() is the body, where one has left the range of numbers that
-/// questions take; TANDEM_OUT_OF_MEMORY. After an error bodies are as after the last step that was whole.
+/// questions take or has become faster than tandem_world_set_bodies() allows; TANDEM_OUT_OF_MEMORY. After an
+/// error bodies are as after the last step that was whole, and there are no contacts.
 TANDEM_API tandem_status tandem_world_step(tandem_world* world, double dt, uint32_t steps);
 
 /// Where a body is, and how it moves.

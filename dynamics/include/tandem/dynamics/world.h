@@ -105,8 +105,9 @@ class World {
   Status set_assets(std::span<const AssetView> assets);
 
   /// Places all bodies anew, at time 0. excluded: pairs that are not to meet. Result: kOk; as of
-  /// Scene::place(), and where() is the body; kOutOfRange where a velocity or gravity_scale is not finite, or
-  /// a number of the material is larger than WorldOptions may have; kNoTopology where its mesh has none, and
+  /// Scene::place(), and where() is the body; kOutOfRange where a velocity is beyond 1e10 along an axis, a
+  /// mass is not from 1e-30 to 1e30 kg, a gravity_scale is beyond 1e6, or a number of the material is larger
+  /// than WorldOptions may have; kNoTopology where its mesh has none, and
   /// kNoMass where it has no extent or the density is not positive, of a moving body; kBadOption, where
   /// where() is 0: an option is out of its range; kOutOfMemory. Of a joint, where where() is its place in the
   /// list: kUnknownInstance, kBadJoint, kNoAxis, kJoinsNothing. After an error there are no bodies.
@@ -114,8 +115,9 @@ class World {
                     std::span<const ObjectPair> excluded = {}, std::span<const JointDescription> joints = {});
 
   /// Makes steps of dt seconds. Result: kOk; kBadDuration where dt is not more than 0 or more than 1000;
-  /// kOutOfRange where a body has left the range of numbers that questions take, and where() is the body;
-  /// kOutOfMemory. After an error bodies are as after the last step that was whole.
+  /// kOutOfRange where a body has left the range of numbers that questions take or has become faster than
+  /// set_bodies() allows, and where() is the body; kOutOfMemory. After an error bodies are as after the last
+  /// step that was whole, and there are no contacts.
   Status step(double dt, std::uint32_t steps = 1);
 
   /// The bodies as they are now. Valid until the next call.
@@ -148,17 +150,19 @@ class World {
   double mass_of(std::uint32_t body) const;
 
   /// Puts a body elsewhere or gives it other velocities, and wakes it; `sleeps` and `centre` are not looked
-  /// at. Result: kOk; kUnknownInstance; kPoseNotRigid; kOutOfRange where a number is not finite.
+  /// at. Result: kOk; kUnknownInstance; kPoseNotRigid; kOutOfRange where a number is not finite or a velocity
+  /// beyond 1e10.
   Status set(std::uint32_t body, const BodyMotion& motion);
 
   /// Adds to a moving body's velocities what an impulse at a point of the world does, and wakes it. Result:
-  /// kOk; kUnknownInstance; kOutOfRange where a number is not finite.
+  /// kOk; kUnknownInstance; kOutOfRange where a number is not finite or a velocity becomes
+  /// larger than 1e10.
   Status push(std::uint32_t body, const double (&impulse)[3], const double (&at)[3]);
 
   /// Sets a force that acts on a moving body's centre of mass in all steps from now on, in newtons, and a
   /// torque about it, in newton metres, both along the world's axes, in place of those before. They are 0 at
-  /// the start, and save() keeps them. Wakes the body where they are not what they were. Result: as of
-  /// push().
+  /// the start, and save() keeps them. Wakes the body where they are not what they were. Result: kOk;
+  /// kUnknownInstance; kOutOfRange where a number is not finite or the acceleration of a point beyond 1e10.
   Status set_force(std::uint32_t body, const double (&force)[3], const double (&torque)[3]);
 
   /// Keeps all that the next steps depend on, and goes back to it. restore() takes what save() of this world

@@ -68,7 +68,7 @@ struct TimedQuery {
   bool traversal = false;              ///< on a GPU: the walk of the trees is timed alone too
   bool manifolds = false;              ///< contact manifolds are made of what each repeat finds, and timed
   /// Manifolds of bodies that stand still are kept too, with this tolerance (MovedOptions), and timed.
-  std::optional<double> kept_within;
+  std::optional<double> kept_within = {};
 };
 
 /// The resources that an engine takes of a GPU.

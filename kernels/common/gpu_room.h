@@ -17,6 +17,7 @@ class Memory;
 class ListedArray {
  public:
   virtual std::size_t bytes_held() const = 0;
+  virtual std::size_t bytes_for(std::uint64_t count) const = 0;  ///< with room for so many
   virtual void give_back() = 0;
   virtual cudaError_t provide(std::uint64_t count) = 0;  ///< for so many of what the room counts
   virtual void name_to(void*) const {}                   ///< writes its place to a kernel's arguments
@@ -43,6 +44,15 @@ class Memory {
     std::size_t sum = 0;
     for (const ListedArray* array = first_; array != nullptr; array = array->next_)
       sum += array->bytes_held();
+    return sum;
+  }
+
+  /// Returns the bytes of a room's arrays for so many of what it counts.
+  std::size_t bytes_for(const void* room, std::uint64_t count) const {
+    std::size_t sum = 0;
+    for (const ListedArray* array = first_; array != nullptr; array = array->next_) {
+      if (array->room_ == room) sum += array->bytes_for(count);
+    }
     return sum;
   }
 
@@ -88,6 +98,7 @@ class Room {
   Memory& memory() const { return memory_; }
   Number count() const { return count_; }
   bool has(Number wanted) const { return is_made_ && wanted <= count_; }
+  std::size_t bytes_for(Number wanted) const { return memory_.bytes_for(this, wanted); }
 
   /// Makes room for exactly `wanted` where there is less.
   cudaError_t fit(Number wanted) {
@@ -150,6 +161,7 @@ class RoomArray : public GpuArray<Element>, public ListedArray {
 
  private:
   std::size_t bytes_held() const override { return this->bytes(); }
+  std::size_t bytes_for(std::uint64_t count) const override { return elements_(count) * sizeof(Element); }
   void give_back() override {
     if (growth_ == Growth::forgets) this->free();
   }

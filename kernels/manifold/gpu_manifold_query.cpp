@@ -70,6 +70,18 @@ struct HostOf<GpuManifoldReport> : GpuHost<ManifoldState, GpuManifoldReport> {
     return {of_pairs.count(), of_contacts.count(), of_manifolds.count(), of_points.count()};
   }
 
+  static std::size_t table_size(std::uint32_t pairs) { return 2 * std::size_t{pairs} + 32; }
+  static std::size_t starts(std::uint32_t pairs, std::uint64_t contacts) { return contacts + pairs + 1; }
+
+  /// Returns the most that bytes() is with so much room.
+  std::size_t most_bytes(const GpuManifoldCapacity& most, std::size_t assets) const {
+    return sizeof(ManifoldState) + assets * sizeof(manifold::Shape) +
+           table_size(most.pairs) * sizeof(TableEntry) +
+           starts(most.pairs, most.contacts) * sizeof(std::uint32_t) + of_pairs.bytes_for(most.pairs) +
+           of_contacts.bytes_for(most.contacts) + of_manifolds.bytes_for(most.manifolds) +
+           of_points.bytes_for(most.points);
+  }
+
   Status set_assets(std::span<const GpuAsset> given, cudaStream_t stream) {
     if (!summary_of(given).topology) return Status::kNoTopology;
     Status status = provide_fixed_memory();
@@ -88,7 +100,7 @@ struct HostOf<GpuManifoldReport> : GpuHost<ManifoldState, GpuManifoldReport> {
 
   // Moves what the table holds to a larger one where there is room for more pairs than before.
   Status enlarge_table() {
-    const std::size_t size = 2 * std::size_t{of_pairs.count()} + 32;
+    const std::size_t size = table_size(of_pairs.count());
     if (size <= table.room()) return Status::kOk;
     GpuArray<TableEntry> larger;
     Status status = keep(larger.reserve(size));
@@ -115,7 +127,7 @@ struct HostOf<GpuManifoldReport> : GpuHost<ManifoldState, GpuManifoldReport> {
     }
     if (status == Status::kOk) status = keep(of_contacts.grow(wanted.contacts));
     if (status == Status::kOk) {
-      status = keep(start.reserve(of_contacts.count() + of_pairs.count() + 1));
+      status = keep(start.reserve(starts(of_pairs.count(), of_contacts.count())));
       if (status != Status::kOk) of_contacts.forget();
     }
     if (status == Status::kOk) status = keep(of_manifolds.grow(wanted.manifolds));
@@ -144,6 +156,10 @@ namespace tandem {
 
 template class GpuQuestion<GpuManifoldCapacity, GpuManifoldReport>;
 template class GpuAssetQuestion<GpuManifoldCapacity, GpuManifoldReport>;
+
+std::size_t most_manifold_bytes(const GpuManifoldCapacity& capacity, std::size_t assets) {
+  return gpu::HostOf<GpuManifoldReport>().most_bytes(capacity, assets);
+}
 
 Status GpuManifoldQuery::enqueue(const GpuInstances& instances, const GpuPairs& pairs,
                                  const GpuContactQuery& query, const GpuManifoldOptions& options,

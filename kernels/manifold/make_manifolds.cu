@@ -149,13 +149,14 @@ __global__ void __launch_bounds__(kThreads, 3) make_pieces(const __grid_constant
     if (wanted) own.add(meeting);
     add_bounds(args, contact.pair, wanted, own);
     const std::uint32_t same = __match_any_sync(0xFFFFFFFFu, wanted ? contact.pair : kNoIndex);
-    if (!wanted) continue;
-    // The first lane of those with the same pair takes room for all of them.
+    // The first lane of those with the same pair takes room for all of them. All lanes shuffle, those
+    // without a piece too, so that one mask serves all sets of lanes.
     const int leader = __ffs(static_cast<int>(same)) - 1;
     std::uint32_t place = 0;
-    if (threadIdx.x % 32 == static_cast<std::uint32_t>(leader))
+    if (wanted && threadIdx.x % 32 == static_cast<std::uint32_t>(leader))
       place = atomicAdd(&args.of_pair[contact.pair].pieces.pieces, static_cast<std::uint32_t>(__popc(same)));
-    place = __shfl_sync(same, place, leader) + __popc(same & ((1u << threadIdx.x % 32) - 1));
+    place = __shfl_sync(0xFFFFFFFFu, place, leader) + __popc(same & ((1u << threadIdx.x % 32) - 1));
+    if (!wanted) continue;
     write_piece(memory_of(args, contact.pair), place, contact, a.normal, b.normal, meeting);
   }
 }

@@ -59,6 +59,28 @@ class PieceJoiner {
   std::uint32_t slots_;
 };
 
+/// The latest corners of b's triangles among pieces with one triangle of a. They are few, because contacts
+/// are found block by block.
+class LatestCorners {
+ public:
+  /// The piece that had this corner with the same triangle of a, or `piece`, which is noted then.
+  std::uint32_t find_or_note(std::uint32_t triangle_a, std::uint32_t vertex, std::uint32_t piece) {
+    if (triangle_a != triangle_a_) triangle_a_ = triangle_a, count_ = 0;
+    const std::uint32_t known = count_ < kMost ? count_ : kMost;
+    for (std::uint32_t i = 0; i < known; ++i) {
+      if (vertex_[i] == vertex) return piece_[i];
+    }
+    const std::uint32_t at = count_++ % kMost;
+    vertex_[at] = vertex, piece_[at] = piece;
+    return piece;
+  }
+
+ private:
+  static constexpr std::uint32_t kMost = 16;
+
+  std::uint32_t vertex_[kMost], piece_[kMost], count_ = 0, triangle_a_ = kNoIndex;
+};
+
 }  // namespace
 
 void ManifoldLanes::add_piece(const PieceMemory& memory, const Contact& contact,
@@ -99,15 +121,22 @@ bool ManifoldLanes::connect_by_ends(const BodyPair& bodies, const PieceMemory& m
 void ManifoldLanes::connect_by_corners(const BodyPair& bodies, const PieceMemory& memory,
                                        std::uint32_t pieces) {
   PieceJoiner joiner(memory, pieces, 9 * pieces + 1);
+  LatestCorners latest;
   for (std::uint32_t i = 0; i < pieces; ++i) {
     const Piece& piece = memory.pieces[i];
     const std::uint32_t(&u)[3] = bodies.a.shape->topology[piece.triangle[0]].vertex;
-    const std::uint32_t(&v)[3] = bodies.b.shape->topology[piece.triangle[1]].vertex;
     std::uint32_t first_piece = i;
-    for (int k = 0; k < 9; ++k) {
-      bool first;
-      const std::uint32_t there = joiner.insert(u[k / 3], v[k % 3], 0, i, first);
-      if (!first) first_piece = joiner.join(first_piece, there);
+    for (const std::uint32_t v : bodies.b.shape->topology[piece.triangle[1]].vertex) {
+      const std::uint32_t known = latest.find_or_note(piece.triangle[0], v, i);
+      if (known != i) {  // it has put all three corners of a with this one into the table
+        first_piece = joiner.join(first_piece, known);
+        continue;
+      }
+      for (const std::uint32_t corner : u) {
+        bool first;
+        const std::uint32_t there = joiner.insert(corner, v, 0, i, first);
+        if (!first) first_piece = joiner.join(first_piece, there);
+      }
     }
   }
 }

@@ -53,6 +53,13 @@ class Manifolds(BenchTest):
         self.assertLessEqual(set(table["points/face_a"].tolist()), set(range(1, 6)))
         self.assertLessEqual(set(table["points/face_b"].tolist()), {0, 2, 3, 4, 5})
 
+    def test_bodies_that_stand_still_keep_their_manifolds(self):
+        self.make("pile", "--count", "50")
+        report = self.query("--manifolds", "--keep", "1e-3", "--repeat", "3")
+        self.assertEqual(report["kept_pairs"], report["object_pairs"])
+        self.assertEqual(len(report["kept_seconds"]["all"]), 3)
+        self.assertEqual(self.query("--manifolds", "--keep", "0")["kept_pairs"], 0)
+
     def test_manifolds_are_of_the_documented_types_and_belong_together(self):
         self.make("pile", "--count", "50")
         self.query("--manifolds", "--out", self.contacts)

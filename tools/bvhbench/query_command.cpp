@@ -16,6 +16,7 @@ struct QueryArguments : CommonArguments {
   double within = 0;
   std::optional<double> tolerance;
   std::optional<std::array<double, 3>> at;
+  std::optional<double> kept_within;
   bool first_contact = false, self_pairs = false;
   bool grouped = false, sorted = false, traversal = false, manifolds = false, contained = false;
 
@@ -87,8 +88,8 @@ Answer find(const QueryArguments& arguments, const LoadedScene& scene) {
   engine->set_shapes(views);
   engine->set_filter(pairs.filter());
   engine->update(scene.description.instances);
-  answer.timed = engine->time_query(
-      {pairs.given(), arguments.repeats, arguments.order(), arguments.traversal, arguments.manifolds});
+  answer.timed = engine->time_query({pairs.given(), arguments.repeats, arguments.order(), arguments.traversal,
+                                     arguments.manifolds, arguments.kept_within});
   answer.counters = engine->counters();
   if (arguments.contained) {
     answer.contained = find_contained(scene, answer.timed.pairs, answer.timed.contacts, arguments.threads(),
@@ -139,6 +140,11 @@ Report report_of(const QueryArguments& arguments, const LoadedScene& scene, cons
     report.add("manifold_seconds", times(answer.timed.manifolds.seconds))
         .row("  manifolds", Unit::milliseconds, " on top");
   }
+  if (arguments.kept_within) {
+    report.add_json("kept_pairs", answer.timed.manifolds.kept_pairs);
+    report.add("kept_seconds", times(answer.timed.manifolds.kept))
+        .row("  kept", Unit::milliseconds, " for all of it where pairs are kept");
+  }
   if (arguments.contained) {
     report.add_json("contained", count_inside(answer.contained.rows)).row("contained");
     report.add_json("contained_rows", answer.contained.rows.size());
@@ -171,6 +177,8 @@ void check_options(const QueryArguments& arguments) {
     throw UsageError(
         "--manifolds takes all contacts, so neither --mode boxes nor --first-contact goes with it");
   }
+  if (arguments.kept_within && (!arguments.manifolds || arguments.self_pairs))
+    throw UsageError("--keep goes with --manifolds, and without --self");
   if (arguments.contained && (arguments.mode != QueryMode::exact || arguments.first_contact)) {
     throw UsageError(
         "--contained takes all exact contacts, so neither --mode nor --first-contact goes with it");
@@ -245,6 +253,9 @@ void add_query(Command tool, Run& run_later) {
                 "only which bodies surely meet, which surely do not, and which are within T, by their levels",
                 between(0, kLargestWorldCoordinate)},
                {"--manifolds", arguments.manifolds, "also contact manifolds: normals, depths and points"},
+               {"--keep", arguments.kept_within, "T",
+                "with --manifolds: also the time for bodies that stand still, whose pairs are kept within T",
+                between(0, kLargestWorldCoordinate)},
                {"--contained", arguments.contained,
                 "also bodies that lie within others without touching them, found on the CPU"},
                {"--at", arguments.at, "X Y Z", "also which bodies' world boxes contain this point",

@@ -46,6 +46,15 @@ void sort_contacts(std::vector<TriangleContact>& contacts) {
 
 }  // namespace
 
+void check_kept(std::span<const Manifold> manifolds, std::span<const ManifoldPoint> points,
+                const TimedManifolds& found) {
+  const auto same = [](const auto& kept, const auto& rows) {
+    return std::ranges::equal(std::as_bytes(std::span(kept)), std::as_bytes(std::span(rows)));
+  };
+  if (!same(manifolds, found.manifolds) || !same(points, found.points))
+    throw std::runtime_error("manifolds that were kept are not those that were found");
+}
+
 void Engine::cannot(const char* what) const {
   throw std::logic_error("the engine " + std::string(name_) + " was not made to " + what);
 }

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 #include <stdexcept>
 #include <string>
@@ -66,6 +67,8 @@ struct TimedQuery {
   OrderOnGpu order = OrderOnGpu::any;  ///< on a GPU
   bool traversal = false;              ///< on a GPU: the walk of the trees is timed alone too
   bool manifolds = false;              ///< contact manifolds are made of what each repeat finds, and timed
+  /// Manifolds of bodies that stand still are kept too, with this tolerance (MovedOptions), and timed.
+  std::optional<double> kept_within = {};
 };
 
 /// The resources that an engine takes of a GPU.
@@ -85,7 +88,13 @@ struct TimedManifolds {
   std::vector<ManifoldPoint> points;
   ManifoldCounters counters;
   Seconds seconds;  ///< of each repeat, beside the query's
+  Seconds kept;     ///< of each repeat with pairs that are kept: broad phase, query and manifolds together
+  std::uint64_t kept_pairs = 0;
 };
+
+/// Throws unless manifolds that were kept are, to the last byte, those that were found.
+void check_kept(std::span<const Manifold> manifolds, std::span<const ManifoldPoint> points,
+                const TimedManifolds& found);
 
 /// The pairs that a timed question was about, and how long its repeats took.
 struct TimedRun {

@@ -91,7 +91,24 @@ TimedAnswer GpuContactEngine::time_query(const TimedQuery& asked) {
   if (asked.manifolds) take_manifolds(answer.manifolds);
   take(pairs, contacts, asked.order, answer);
   if (asked.traversal) answer.traversal = time_walk(pairs, asked.repeats);
+  if (asked.kept_within) time_kept(pairs, asked, answer);
   return answer;
+}
+
+// The bodies stand still, so what is kept is what was found.
+void GpuContactEngine::time_kept(const GpuPairs& pairs, const TimedQuery& asked, TimedAnswer& answer) {
+  const Before find_pairs = [&](unsigned) {
+    if (asked.given == nullptr) enqueue_broad_phase(asked.order == OrderOnGpu::sorted);
+  };
+  const std::function<void()> run = repeatable_with_kept_manifolds(pairs, *asked.kept_within, find_pairs);
+  answer.manifolds.kept = time_repeats(asked.repeats, run);
+  TimedAnswer kept;
+  kept.pairs.resize(answer.pairs.size());
+  check(download(pairs.pairs, std::span(kept.pairs), stream()), "download");
+  take_manifolds(kept.manifolds);
+  sort_pairs(kept);
+  answer.manifolds.kept_pairs = kept.manifolds.kept_pairs;
+  check_kept(kept.manifolds.manifolds, kept.manifolds.points, answer.manifolds);
 }
 
 void GpuContactEngine::time_answer(const GpuPairs& pairs, const TimedQuery& asked, TimedAnswer& answer) {

@@ -41,6 +41,12 @@ class GpuContactEngine : public GpuEngine {
     cannot("make manifolds");
   }
 
+  /// Returns a function that queues `before`, the query of the pairs that have moved by more than a tolerance
+  /// and the manifolds of all. It has run once, so that there are manifolds to keep.
+  virtual std::function<void()> repeatable_with_kept_manifolds(const GpuPairs&, double, const Before&) {
+    cannot("keep manifolds");
+  }
+
   /// Takes the manifolds that the last repeat made; their rows are those of the GPU's pairs.
   virtual void take_manifolds(TimedManifolds&) {}
 
@@ -53,6 +59,7 @@ class GpuContactEngine : public GpuEngine {
 
  private:
   void time_answer(const GpuPairs& pairs, const TimedQuery& asked, TimedAnswer& answer);
+  void time_kept(const GpuPairs& pairs, const TimedQuery& asked, TimedAnswer& answer);
   void take(const GpuPairs& pairs, const GpuContacts& contacts, OrderOnGpu order, TimedAnswer& answer) const;
   std::size_t most_bytes_of(const TimedQuery& asked) const;
 

@@ -5,6 +5,7 @@
 
 #include "engine.h"
 #include "tandem/kernels/manifold_query.h"
+#include "tandem/kernels/moved_query.h"
 
 namespace tandem {
 namespace {
@@ -145,10 +146,27 @@ class TandemContacts final : public TandemEngine<ContactQuery> {
     counters_ = query_.counters();
     answer.pairs.assign(query_.pairs().begin(), query_.pairs().end());
     contacts(answer.contacts);
+    if (asked.kept_within) keep_manifolds(asked, answer.manifolds);
     return answer;
   }
 
  private:
+  // The first turn finds what the others keep.
+  void keep_manifolds(const TimedQuery& asked, TimedManifolds& made) {
+    MovedQuery moved;
+    for (std::uint32_t i = 0; i <= asked.repeats; ++i) {
+      Stopwatch watch;
+      check(place());
+      const MovedOptions options = {.tolerance = *asked.kept_within};
+      check(asked.given != nullptr ? moved.find(scene_, *asked.given, options) : moved.find(scene_, options));
+      check(query_.find(scene_, moved.rows(), options_));
+      check(manifolds_.find(scene_, moved, query_, {.match_previous = false}));
+      if (i > 0) made.kept.push_back(watch.lap());
+    }
+    made.kept_pairs = moved.counters().kept;
+    check_kept(manifolds_.rows(), manifolds_.points(), made);
+  }
+
   void make_manifolds(TimedManifolds& made) {
     Stopwatch watch;
     const Status status = manifolds_.find(scene_, query_, {.match_previous = false});

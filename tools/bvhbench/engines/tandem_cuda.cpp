@@ -8,6 +8,7 @@
 #include "tandem/kernels/gpu_distance_query.h"
 #include "tandem/kernels/gpu_impact_query.h"
 #include "tandem/kernels/gpu_manifold_query.h"
+#include "tandem/kernels/gpu_moved_query.h"
 #include "tandem/kernels/gpu_tolerance_query.h"
 
 namespace tandem {
@@ -62,7 +63,6 @@ class CudaContacts final : public GpuContactEngine {
                                                   const Before& before, const Before& between) override {
     GpuContactOptions with_groups = options(order);
     with_groups.grouped = true;
-    constexpr GpuManifoldOptions kOfFeatures = {.match_previous = false};
     check(query_.reserve(query_.capacity(), with_groups), query_.cuda_error(), "contacts");
     enqueue(query_, pairs, with_groups, "contacts");
     check(cudaStreamSynchronize(stream()), "contacts");
@@ -78,13 +78,35 @@ class CudaContacts final : public GpuContactEngine {
     });
   }
 
+  std::function<void()> repeatable_with_kept_manifolds(const GpuPairs& pairs, double tolerance,
+                                                       const Before& before) override {
+    const GpuMovedOptions within = {.tolerance = tolerance};
+    const GpuContactOptions with_groups = options(OrderOnGpu::grouped);
+    require(moved_.set_assets(shapes(), stream()), 0);
+    check(moved_.find(instances(), pairs, within, stream()), moved_.cuda_error(), "moved pairs");
+    const GpuMoved moved = moved_.moved();
+    check(query_.find_contacts(instances(), moved.moved, with_groups, stream()), query_, "contacts");
+    check(manifolds_.make(instances(), moved, query_, kOfFeatures, stream()), manifolds_.cuda_error(),
+          "manifolds");
+    return captured([=, this, &before] {
+      before(cudaEventRecordExternal);
+      check(moved_.enqueue(instances(), pairs, within, stream()), moved_.cuda_error(), "moved pairs");
+      enqueue(query_, moved.moved, with_groups, "contacts");
+      check(manifolds_.enqueue(instances(), moved, query_, kOfFeatures, stream()), manifolds_.cuda_error(),
+            "manifolds");
+    });
+  }
+
   void take_manifolds(TimedManifolds& made) override {
     const GpuManifoldReport& report = manifolds_.report();
+    if (report.status != Status::kOk || report.complete == 0)
+      throw std::runtime_error("the GPU: a repeat made no manifolds");
     made.manifolds.resize(report.manifolds);
     made.points.resize(report.points);
     made.counters = report.counters;
     check(download(manifolds_.manifolds(), std::span(made.manifolds), stream()), "download");
     check(download(manifolds_.points(), std::span(made.points), stream()), "download");
+    if (moved_.capacity().pairs != 0) made.kept_pairs = moved_.report().counters.kept;
   }
 
   Seconds time_walk(const GpuPairs& pairs, std::uint32_t repeats) override {
@@ -114,9 +136,12 @@ class CudaContacts final : public GpuContactEngine {
     return most_query_bytes(query_.capacity(), options(order), shapes().size());
   }
 
+  static constexpr GpuManifoldOptions kOfFeatures = {.match_previous = false};
+
   ContactOptions options_;
   GpuContactQuery query_;
   GpuManifoldQuery manifolds_;
+  GpuMovedQuery moved_;
 };
 
 /// A question that has a row for each pair.

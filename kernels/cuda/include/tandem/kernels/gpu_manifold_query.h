@@ -22,12 +22,8 @@ struct GpuManifoldCapacity {
   std::uint32_t points = 0;
 };
 
-/// GPU memory that an object with room for so much, of so many assets, holds at most.
-constexpr std::size_t most_manifold_bytes(const GpuManifoldCapacity& capacity, std::size_t assets) {
-  constexpr std::size_t kFixed = std::size_t{1} << 20;
-  return kFixed + 128 * assets + 232 * std::size_t{capacity.pairs} + 180 * capacity.contacts +
-         3220 * std::size_t{capacity.manifolds} + 272 * std::size_t{capacity.points};
-}
+/// Returns the bytes of GPU memory that an object with room for so much, of so many assets, holds at most.
+std::size_t most_manifold_bytes(const GpuManifoldCapacity& capacity, std::size_t assets);
 
 /// The outcome of a call.
 struct GpuManifoldReport {

@@ -11,6 +11,9 @@ namespace {
 // pass by each other, a plane between them says too much about what lies ahead.
 constexpr double kFarthest = 0.25;
 
+// Two ways are about the same if the cosine of the angle between them is more than this.
+constexpr double kSameWay = 0.5;
+
 // More than a million steps may make of rounding errors in the distance of two bodies.
 double rounding_of(const BodiesAhead& of, const ObjectPair& pair) {
   constexpr double kOfSize = 1e-9;
@@ -155,13 +158,18 @@ void ContactsAhead::find_approaches(const BodiesAhead& of) {
     const double closing = dot(approach_of(pair, of.states), from_b) / gap + turning_of(pair);
     const double most = kFarthest * std::min(of.bodies[pair.a].radius, of.bodies[pair.b].radius);
     const double overlap = of.overlap();
-    if (gap <= std::min(most, of.dt * std::max(0.0, closing) + of.fall_along(pair, from_b / gap) + overlap))
-      approaches_.push_back({pair, ((gap + overlap) / gap) * from_b});
+    if (gap > std::min(most, of.dt * std::max(0.0, closing) + of.fall_along(pair, from_b / gap) + overlap))
+      continue;
+    approaches_.push_back({pair, gap, true, ((gap + overlap) / gap) * from_b});
+    // A bowl in a bowl meets it all around, and not only where it is nearest.
+    const Vector3 moving = of.dt * approach_of(pair, of.states) + of.fall_towards(pair, from_b);
+    const double along = dot(moving, from_b) / gap;
+    if (along < kSameWay * norm(moving) && gap + overlap <= along)
+      approaches_.push_back({pair, gap, false, ((gap + overlap) / along) * moving});
   }
 }
 
 void ContactsAhead::find_points(const BodiesAhead& of) {
-  constexpr double kSameWay = 0.5;  // cosine of the angle between b's way and a normal, at least
   clear_moved();
   for (const Approach& approach : approaches_) {
     BodyState moved = of.states[approach.pair.b];
@@ -173,9 +181,9 @@ void ContactsAhead::find_points(const BodiesAhead& of) {
   std::erase_if(points_, [&](ContactPoint& point) {
     const Approach& approach = approaches_[point.body_a / 2];
     const double along = -dot(approach.way, point.normal);
-    if (!(along > kSameWay * norm(approach.way))) return true;
+    if (!(along > (approach.is_nearest ? kSameWay * norm(approach.way) : 0))) return true;
     point.body_a = approach.pair.a, point.body_b = approach.pair.b;
-    point.depth -= along;
+    point.depth = std::min(point.depth - along, -approach.gap);
     point.position -= 0.5 * approach.way;
     return false;
   });

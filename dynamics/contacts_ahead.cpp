@@ -161,11 +161,14 @@ void ContactsAhead::find_approaches(const BodiesAhead& of) {
     if (gap > std::min(most, of.dt * std::max(0.0, closing) + of.fall_along(pair, from_b / gap) + overlap))
       continue;
     approaches_.push_back({pair, gap, true, ((gap + overlap) / gap) * from_b});
-    // A bowl in a bowl meets it all around, and not only where it is nearest.
-    const Vector3 moving = of.dt * approach_of(pair, of.states) + of.fall_towards(pair, from_b);
-    const double along = dot(moving, from_b) / gap;
-    if (along < kSameWay * norm(moving) && gap + overlap <= along)
-      approaches_.push_back({pair, gap, false, ((gap + overlap) / along) * moving});
+    // A bowl that falls into another meets it all around, and not only where it is nearest. What moves
+    // across its fall is not looked for: a ball that rolls would meet the ground before it.
+    const Vector3 fall = of.fall_towards(pair, from_b);
+    if (!(dot(fall, from_b) > 0 && dot(fall, from_b) < kSameWay * norm(fall) * gap)) continue;
+    const double speed = dot(approach_of(pair, of.states), fall) / norm(fall);
+    const double far = norm(fall) + of.dt * std::max(0.0, speed);
+    const double way = (gap + overlap) * gap * norm(fall) / dot(fall, from_b);
+    if (way <= far) approaches_.push_back({pair, gap, false, (way / norm(fall)) * fall});
   }
 }
 
@@ -183,7 +186,8 @@ void ContactsAhead::find_points(const BodiesAhead& of) {
     const double along = -dot(approach.way, point.normal);
     if (!(along > (approach.is_nearest ? kSameWay * norm(approach.way) : 0))) return true;
     point.body_a = approach.pair.a, point.body_b = approach.pair.b;
-    point.depth = std::min(point.depth - along, -approach.gap);
+    point.depth -= along;
+    if (!approach.is_nearest) point.depth = std::min(point.depth, -approach.gap);
     point.position -= 0.5 * approach.way;
     return false;
   });

@@ -207,12 +207,13 @@ std::span<const ObjectPair> ContactsAhead::add_missed(std::vector<ContactPoint>&
   std::erase_if(points_, [&](ContactPoint& point) {
     const ObjectPair& pair = pairs_[point.body_a / 2];
     point.body_a = pair.a, point.body_b = pair.b;
+    point.feature = 0;  // it is of the moved scene, whose bodies depend on what is known of distances
     if (point.depth <= start.slop) return true;
     carry(point, anchor_of(point, end), start.states);
     return point.depth >= 0;
   });
   for (const ContactPoint& point : points_) {
-    const ObjectPair pair = {point.body_a, point.body_b};
+    const ObjectPair pair = pair_of(point);
     if (missed_.empty() || missed_.back() != pair) missed_.push_back(pair);
   }
   add_points_to(found);

@@ -27,6 +27,12 @@ struct BodiesAhead {
     const double pull = std::max(std::fabs(dot(a.linear, direction)), std::fabs(dot(b.linear, direction)));
     return kFall * (pull + a.turning + b.turning) * dt * dt;
   }
+  /// Returns how b may fall as seen from a while something holds one of them: the fall that leads further
+  /// along a direction.
+  Vector3 fall_towards(const ObjectPair& pair, const Vector3& direction) const {
+    const Vector3 of_b = pulls[pair.b].linear, of_a = -pulls[pair.a].linear;
+    return (kFall * dt * dt) * (dot(of_b, direction) > dot(of_a, direction) ? of_b : of_a);
+  }
   double fall(const ObjectPair& pair) const { return std::max(fall(pair.a), fall(pair.b)); }
   double fall(std::uint32_t body) const { return kFall * pulls[body].most() * dt * dt; }
 

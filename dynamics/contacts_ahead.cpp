@@ -11,6 +11,9 @@ namespace {
 // pass by each other, a plane between them says too much about what lies ahead.
 constexpr double kFarthest = 0.25;
 
+// Two ways are about the same if the cosine of the angle between them is more than this.
+constexpr double kSameWay = 0.5;
+
 // More than a million steps may make of rounding errors in the distance of two bodies.
 double rounding_of(const BodiesAhead& of, const ObjectPair& pair) {
   constexpr double kOfSize = 1e-9;
@@ -175,13 +178,21 @@ void ContactsAhead::find_approaches(const BodiesAhead& of) {
     const double closing = dot(approach_of(pair, of.states), from_b) / gap + turning_of(pair);
     const double most = kFarthest * std::min(of.bodies[pair.a].radius, of.bodies[pair.b].radius);
     const double overlap = of.overlap();
-    if (gap <= std::min(most, of.dt * std::max(0.0, closing) + of.fall_along(pair, from_b / gap) + overlap))
-      approaches_.push_back({pair, ((gap + overlap) / gap) * from_b});
+    if (gap > std::min(most, of.dt * std::max(0.0, closing) + of.fall_along(pair, from_b / gap) + overlap))
+      continue;
+    approaches_.push_back({pair, gap, true, ((gap + overlap) / gap) * from_b});
+    // A bowl that falls into another meets it all around, and not only where it is nearest. What moves
+    // across its fall is not looked for: a ball that rolls would meet the ground before it.
+    const Vector3 fall = of.fall_towards(pair, from_b);
+    if (!(dot(fall, from_b) > 0 && dot(fall, from_b) < kSameWay * norm(fall) * gap)) continue;
+    const double speed = dot(approach_of(pair, of.states), fall) / norm(fall);
+    const double far = norm(fall) + of.dt * std::max(0.0, speed);
+    const double way = (gap + overlap) * gap * norm(fall) / dot(fall, from_b);
+    if (way <= far) approaches_.push_back({pair, gap, false, (way / norm(fall)) * fall});
   }
 }
 
 void ContactsAhead::find_points(const BodiesAhead& of) {
-  constexpr double kSameWay = 0.5;  // cosine of the angle between b's way and a normal, at least
   clear_moved();
   for (const Approach& approach : approaches_) {
     BodyState moved = of.states[approach.pair.b];
@@ -193,9 +204,10 @@ void ContactsAhead::find_points(const BodiesAhead& of) {
   std::erase_if(points_, [&](ContactPoint& point) {
     const Approach& approach = approaches_[point.body_a / 2];
     const double along = -dot(approach.way, point.normal);
-    if (!(along > kSameWay * norm(approach.way))) return true;
+    if (!(along > (approach.is_nearest ? kSameWay * norm(approach.way) : 0))) return true;
     point.body_a = approach.pair.a, point.body_b = approach.pair.b;
     point.depth -= along;
+    if (!approach.is_nearest) point.depth = std::min(point.depth, -approach.gap);
     point.position -= 0.5 * approach.way;
     return false;
   });
@@ -215,12 +227,13 @@ std::span<const ObjectPair> ContactsAhead::add_missed(std::vector<ContactPoint>&
   std::erase_if(points_, [&](ContactPoint& point) {
     const ObjectPair& pair = pairs_[point.body_a / 2];
     point.body_a = pair.a, point.body_b = pair.b;
+    point.feature = 0;  // it is of the moved scene, whose bodies depend on what is known of distances
     if (point.depth <= start.slop) return true;
     carry(point, anchor_of(point, end), start.states);
     return point.depth >= 0;
   });
   for (const ContactPoint& point : points_) {
-    const ObjectPair pair = {point.body_a, point.body_b};
+    const ObjectPair pair = pair_of(point);
     if (missed_.empty() || missed_.back() != pair) missed_.push_back(pair);
   }
   add_points_to(found);

@@ -86,6 +86,8 @@ class ContactsAhead {
   };
   struct Approach {
     ObjectPair pair;
+    double gap;  ///< of the nearest points
+    bool is_nearest;
     Vector3 way;  ///< of b, until it overlaps a
   };
   void place(const BodiesAhead& of);

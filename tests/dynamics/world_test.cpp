@@ -37,6 +37,39 @@ TEST(World, ATowerWithGapsComesToRestAsItStands) {
   for (int i = 1; i <= 30; ++i) EXPECT_NEAR(world.bodies()[i].centre[2], i - 0.5, 1e-3);
 }
 
+// Nothing tells before the step that the box in the middle will move.
+TEST(World, ABodyThatIsPushedStopsAtTheNextOne) {
+  constexpr double kGap = 1e-3;
+  WorldOnGround scene(box(1, 1, 1));
+  scene.add(shift(0, 0, 5)).filter.motion = Motion::fixed;
+  scene.add(shift(1 + kGap, 0, 5));
+  scene.add(shift(2 + 2 * kGap, 0, 5)).velocity[0] = -3;
+  World& world = scene.begin({.gravity = {0, 0, 0}});
+  for (int i = 0; i < 10; ++i) {
+    ASSERT_EQ(world.step(kStep), Status::kOk);
+    EXPECT_GT(world.bodies()[2].centre[0], 1 - kGap) << i;
+  }
+}
+
+// Each is nearest to the next in one place, but stands in it all around.
+TEST(World, FunnelsThatFallIntoEachOtherStandWhereTheyMeet) {
+  constexpr double kGap = 3e-4, kWall = 0.01, kSlope = 0.2;
+  const auto radius = [](double height) { return static_cast<float>(0.3 + kSlope * height); };
+  const auto wall = static_cast<float>(kWall);
+  WorldOnGround scene(revolved(
+      {{0, 0}, {radius(0), 0}, {radius(1), 1}, {radius(1) - wall, 1}, {radius(wall) - wall, wall}, {0, wall}},
+      48));
+  for (int i = 0; i < 8; ++i) scene.add(shift(0, 0, kGap + i * (kWall / kSlope + kGap)));
+  World& world = scene.begin();
+  double fastest = 0;
+  for (int i = 0; i < 60; ++i) {
+    ASSERT_EQ(world.step(kStep), Status::kOk);
+    fastest = std::max(fastest, scene.fastest());
+  }
+  EXPECT_LT(fastest, 0.35);
+  EXPECT_LT(scene.fastest(), 1e-3);
+}
+
 TEST(World, ContactsCarryTheWeight) {
   WorldOnGround scene(box(1, 1, 1));
   scene.add(shift(0, 0, 0.5));

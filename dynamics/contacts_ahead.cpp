@@ -27,7 +27,7 @@ bool comes_before(const ContactPoint& p, const ContactPoint& q) {
 }  // namespace
 
 ContactsAhead::ContactsAhead(std::span<const AssetView> assets, std::uint32_t threads,
-                             const PairFilter& filter)
+                             const PairFilter* filter)
     : filter_(filter) {
   for (Scene* scene : {&scene_, &moved_}) {
     require(scene->set_threads(threads), *scene);
@@ -79,8 +79,7 @@ void ContactsAhead::place(const BodiesAhead& of) {
     if (of.is_idle(static_cast<std::uint32_t>(i))) motion_[i] = Motion::fixed;
     turning_[i] = motion_[i] == Motion::fixed ? 0 : of.bodies[i].radius * norm(of.states[i].angular_velocity);
   }
-  filter_.motion = motion_.data();
-  require(scene_.place(instances_, filter_), scene_);
+  require(scene_.place(instances_, with_motions(filter_, motion_)), scene_);
 }
 
 // Finds how far bodies have moved since the last call.

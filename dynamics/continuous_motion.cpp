@@ -37,7 +37,7 @@ Quaternion turned(const Quaternion& orientation, const Vector3& turn) {
 }  // namespace
 
 ContinuousMotion::ContinuousMotion(std::span<const AssetView> shapes, std::uint32_t threads,
-                                   const PairFilter& filter)
+                                   const PairFilter* filter)
     : filter_(filter) {
   require(moving_.set_threads(threads), moving_);
   require(moving_.set_assets(shapes), moving_);
@@ -137,8 +137,7 @@ bool ContinuousMotion::stop(std::span<const BodyProperties> bodies, std::span<co
       motion_[i].centre[k] = at(before[i].position, k);
     }
   }
-  filter_.motion = fast_.data();
-  require(moving_.place(instances_, filter_), moving_);
+  require(moving_.place(instances_, with_motions(filter_, fast_)), moving_);
   require(query_.find(moving_, {.motion = motion_, .duration = 1, .tolerance = 1e-8}), moving_);
   stop_.assign(bodies.size(), 1);
   bool earlier = false;

@@ -18,9 +18,11 @@ namespace tandem::dynamics {
 /// shape: half the least side of its bounds. Steps without a fast body cost next to nothing.
 class ContinuousMotion {
  public:
-  /// The data that the shapes and the filter look at must outlive this. The filter names the pairs that may
-  /// meet; its motions are not looked at. Throws QueryFailed where a shape cannot be taken.
-  ContinuousMotion(std::span<const AssetView> shapes, std::uint32_t threads, const PairFilter& filter = {});
+  /// What the shapes and the filter look at, and the filter, must outlive this. filter: names the pairs that
+  /// may meet, or null; its motions are not looked at, and what it excludes may change between calls. Throws
+  /// QueryFailed where a shape cannot be taken.
+  ContinuousMotion(std::span<const AssetView> shapes, std::uint32_t threads,
+                   const PairFilter* filter = nullptr);
 
   /// Takes back what of the way from `before` to `after` leads through other bodies. Throws
   /// QueryFailed where a query fails.
@@ -38,7 +40,7 @@ class ContinuousMotion {
   double depth_at(std::span<const BodyProperties> bodies, std::span<const BodyState> before,
                   const ObjectPair& pair, double part);
 
-  PairFilter filter_;
+  const PairFilter* filter_;
   Scene moving_, two_;  // all bodies, and two of them
   ImpactQuery query_;
   ContactQuery contacts_;

@@ -77,6 +77,7 @@ void Simulation::find_contacts(StepRecord& record) {
   take(record, parts_.contacts->report());
   stopwatch.lap();
   if (parts_.ahead) parts_.ahead->add_to(found_, parts_.contacts->kept(), ahead);
+  drop_contacts_of_unmoved();
   cache_.update(found_, parts_.contacts->kept(), ahead);
   record.broad_phase += near_seconds;
   record.generation += stopwatch.lap();
@@ -86,6 +87,16 @@ void Simulation::find_contacts(StepRecord& record) {
     record.penetration_max = std::max(record.penetration_max, depth);
     record.penetration_mean += depth / static_cast<double>(record.contacts);
   }
+}
+
+// A fixed body that was placed is asked for contacts with all that does not move, of which only those with
+// sleeping bodies count.
+void Simulation::drop_contacts_of_unmoved() {
+  if (placed_.empty()) return;
+  std::erase_if(found_, [&](const ContactPoint& contact) {
+    return bodies_[contact.body_a].motion != Motion::moving &&
+           bodies_[contact.body_b].motion != Motion::moving;
+  });
 }
 
 void Simulation::solve(StepRecord& record) {
@@ -112,8 +123,18 @@ void Simulation::sleep() {
   std::vector<std::uint8_t> driven;
   for (const Joint& joint : joints_) driven.push_back(joint.speed != 0 && joint.most_effort > 0);
   sleep_.wake_touched(acting_, cache_.contacts(), joined_);
+  wake_beside_placed();
   sleep_.fall_asleep(bodies_, states_, islands_, options_.sleep, options_.dt, driven);
   update_acting();
+}
+
+void Simulation::wake_beside_placed() {
+  if (placed_.empty()) return;
+  for (const ContactPoint& contact : cache_.contacts()) {
+    if (placed_[contact.body_a]) sleep_.wake(contact.body_b);
+    if (placed_[contact.body_b]) sleep_.wake(contact.body_a);
+  }
+  placed_.clear();
 }
 
 void Simulation::update_acting() {
@@ -124,7 +145,8 @@ void Simulation::update_acting() {
 
 std::vector<std::uint8_t> Simulation::idle() const {
   std::vector<std::uint8_t> idle(acting_.size());
-  for (std::size_t i = 0; i < idle.size(); ++i) idle[i] = acting_[i].motion == Motion::fixed ? 1 : 0;
+  for (std::size_t i = 0; i < idle.size(); ++i)
+    idle[i] = acting_[i].motion == Motion::fixed && (placed_.empty() || placed_[i] == 0) ? 1 : 0;
   return idle;
 }
 
@@ -156,8 +178,24 @@ void Simulation::take_measures(StepRecord& record) const {
 }
 
 void Simulation::place(std::uint32_t body, const BodyState& state) {
+  if (bodies_[body].motion == Motion::fixed) {
+    placed_.resize(bodies_.size());
+    placed_[body] = 1;
+  }
   states_[body] = state;
+  wake(body);
+}
+
+void Simulation::wake(std::uint32_t body) {
   sleep_.wake(body);
+  if (bodies_[body].motion != Motion::moving) {
+    const auto wake_other = [&](const ObjectPair& pair) {
+      const std::uint32_t other = pair.a == body ? pair.b : pair.a;
+      if ((pair.a == body || pair.b == body) && other != kNoIndex) sleep_.wake(other);
+    };
+    std::ranges::for_each(touches_.touching(), wake_other);
+    std::ranges::for_each(joined_, wake_other);
+  }
   update_acting();
 }
 
@@ -165,8 +203,15 @@ void Simulation::set_force(std::uint32_t body, const BodyForce& force) {
   if (forces_.empty()) forces_.resize(bodies_.size());
   if (forces_[body] == force) return;
   forces_[body] = force;
-  sleep_.wake(body);
-  update_acting();
+  wake(body);
+}
+
+void Simulation::change(std::uint32_t body, const BodySettings& settings) {
+  BodySettings& of = bodies_[body];
+  if (of == settings) return;
+  of = settings;
+  static_cast<BodySettings&>(acting_[body]) = settings;
+  wake(body);
 }
 
 void Simulation::follow_joints(double time) {
@@ -197,6 +242,8 @@ SimulationState Simulation::save() const {
           {quiet.begin(), quiet.end()},
           {groups.begin(), groups.end()},
           forces_,
+          {bodies_.begin(), bodies_.end()},
+          placed_,
           {touching.begin(), touching.end()},
           joints_,
           joint_memory_};
@@ -209,6 +256,11 @@ void Simulation::restore(SimulationState state) {
   parts_.contacts->resume(state.posed);
   sleep_.restore(std::move(state.quiet), std::move(state.groups));
   forces_ = std::move(state.forces);
+  for (std::size_t i = 0; i < state.settings.size(); ++i) {
+    static_cast<BodySettings&>(bodies_[i]) = state.settings[i];
+    static_cast<BodySettings&>(acting_[i]) = state.settings[i];
+  }
+  placed_ = std::move(state.placed);
   touches_.restore(std::move(state.touching));
   joints_ = std::move(state.joints);
   joint_memory_ = std::move(state.joint_memory);

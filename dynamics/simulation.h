@@ -48,12 +48,14 @@ struct SimulationState {
   std::uint64_t step = 0;
   std::vector<BodyState> states;
   std::vector<CachedContact> contacts;
-  std::vector<PosedBodies> posed;     ///< of the contact finder
-  std::vector<double> quiet;          ///< of Sleep
-  std::vector<std::uint32_t> groups;  ///< of Sleep
-  std::vector<BodyForce> forces;      ///< empty: there are none
-  std::vector<ObjectPair> touching;   ///< of Touches
-  std::vector<Joint> joints;          ///< with what their motors ask for
+  std::vector<PosedBodies> posed;      ///< of the contact finder
+  std::vector<double> quiet;           ///< of Sleep
+  std::vector<std::uint32_t> groups;   ///< of Sleep
+  std::vector<BodyForce> forces;       ///< empty: there are none
+  std::vector<BodySettings> settings;  ///< of each body; empty: those that the bodies have
+  std::vector<std::uint8_t> placed;    ///< see Simulation::place(); empty: none was
+  std::vector<ObjectPair> touching;    ///< of Touches
+  std::vector<Joint> joints;           ///< with what their motors ask for
   std::vector<JointMemory> joint_memory;
 };
 
@@ -84,12 +86,17 @@ class Simulation {
   std::span<const BodyState> states() const { return states_; }
   std::vector<Instance> poses() const;
 
-  /// Puts a body somewhere else, awake.
+  /// Puts a body somewhere else, awake. One that contacts do not move wakes what touches it or is joined to
+  /// it, and in the next step what it touches then.
   void place(std::uint32_t body, const BodyState& state);
 
   /// Sets what acts on a body from the next step on, beside gravity and contacts. Wakes it if that is another
   /// force than before.
   void set_force(std::uint32_t body, const BodyForce& force);
+
+  /// Sets the numbers of a body from the next step on. If they are not what they were, the body wakes, or
+  /// where contacts do not move it, what touches it or is joined to it.
+  void change(std::uint32_t body, const BodySettings& settings);
 
   /// Sets how long the next steps are, in seconds.
   void set_step(double dt) { options_.dt = dt; }
@@ -115,10 +122,13 @@ class Simulation {
   void restore(SimulationState state);
 
  private:
+  void wake(std::uint32_t body);
   void find_pulls();
   void find_contacts(StepRecord& record);
   void solve(StepRecord& record);
+  void drop_contacts_of_unmoved();
   void sleep();
+  void wake_beside_placed();
   void update_acting();
   void follow_joints(double time);
   std::vector<std::uint8_t> idle() const;
@@ -137,7 +147,8 @@ class Simulation {
   ContactCache cache_;
   Touches touches_;
   Sleep sleep_;
-  std::vector<BodyForce> forces_;  // of each body; empty: none
+  std::vector<BodyForce> forces_;     // of each body; empty: none
+  std::vector<std::uint8_t> placed_;  // fixed bodies since the last step; empty: none was
   std::vector<Pull> pulls_;
   std::uint64_t step_ = 0;
 };

@@ -27,6 +27,7 @@ struct World::Parts {
   std::vector<AssetView> assets;
   std::vector<std::uint32_t> group, mask;
   ExcludedPairTable excluded;
+  PairFilter filter;  // of these; the simulation looks at it
   std::unique_ptr<Simulation> simulation;
   std::shared_ptr<const char> placed;  // of these bodies alone; null where there are none
   std::vector<BodyMotion> bodies;
@@ -70,10 +71,10 @@ Status check(const WorldOptions& options) {
   return good ? Status::kOk : Status::kBadOption;
 }
 
-bool is_usable_start(const BodyDescription& body, const BodyState& state) {
+bool is_usable(const BodySettings& body) {
   const Material& material = body.material;
-  return is_usable(state) && std::isfinite(body.gravity_scale) && material.friction <= kMost &&
-         material.restitution <= 1 && material.rolling_resistance <= kMost;
+  return std::isfinite(body.gravity_scale) && material.friction <= kMost && material.restitution <= 1 &&
+         material.rolling_resistance <= kMost;
 }
 
 // Adds pairs to others; both are ascending.
@@ -178,7 +179,7 @@ Status World::set_bodies(std::span<const BodyDescription> bodies, const WorldOpt
         states[i].velocity = vector_of(from.velocity);
         states[i].angular_velocity = vector_of(from.angular_velocity);
       }
-      if (!is_usable_start(from, states[i])) return fail(Status::kOutOfRange, i);
+      if (!is_usable(all[i]) || !is_usable(states[i])) return fail(Status::kOutOfRange, i);
       parts.group.push_back(from.filter.group), parts.mask.push_back(from.filter.mask);
     }
     std::vector<ObjectPair> apart(excluded.begin(), excluded.end());
@@ -192,7 +193,7 @@ Status World::set_bodies(std::span<const BodyDescription> bodies, const WorldOpt
     }
     const Status excludes = parts.excluded.set(apart);
     if (excludes != Status::kOk) return fail(excludes);
-    const PairFilter filter = {nullptr, parts.group.data(), parts.mask.data(), parts.excluded.view()};
+    parts.filter = {nullptr, parts.group.data(), parts.mask.data(), parts.excluded.view()};
     SimulationOptions to;
     to.gravity = vector_of(options.gravity);
     to.solver.friction = options.friction, to.solver.restitution = options.restitution;
@@ -204,10 +205,10 @@ Status World::set_bodies(std::span<const BodyDescription> bodies, const WorldOpt
     to.sleep.speed = kSleepSpeed;
     to.threads = options.threads;
     SimulationParts of;
-    of.contacts = make_scene_contacts(parts.assets, options.threads, filter);
-    of.ahead = std::make_unique<ContactsAhead>(parts.assets, options.threads, filter);
+    of.contacts = make_scene_contacts(parts.assets, options.threads, &parts.filter);
+    of.ahead = std::make_unique<ContactsAhead>(parts.assets, options.threads, &parts.filter);
     if (options.continuous)
-      of.continuous = std::make_unique<ContinuousMotion>(parts.assets, options.threads, filter);
+      of.continuous = std::make_unique<ContinuousMotion>(parts.assets, options.threads, &parts.filter);
     of.joints = std::move(joined);
     parts.simulation = std::make_unique<Simulation>(std::move(all), std::move(states), std::move(of), to);
     parts.placed = std::make_shared<char>();
@@ -295,7 +296,7 @@ Status World::step(double dt, std::uint32_t steps) {
         status = Status::kOutOfMemory;
       }
       const auto states = simulation.states();
-      const auto lost = std::ranges::find_if_not(states, is_usable);
+      const auto lost = std::ranges::find_if_not(states, [](const BodyState& of) { return is_usable(of); });
       if (status == Status::kOk && lost != states.end())
         status = Status::kOutOfRange, blamed = static_cast<std::uint64_t>(lost - states.begin());
       if (status != Status::kOk) {
@@ -372,9 +373,35 @@ Status World::set(std::uint32_t body, const BodyMotion& motion) {
   state.velocity = vector_of(motion.velocity);
   state.angular_velocity = vector_of(motion.angular_velocity);
   if (!is_usable(state)) return fail(Status::kOutOfRange, body);
-  parts_->simulation->place(body, state);
+  if (parts_->simulation->bodies()[body].motion == Motion::fixed)
+    state.velocity = state.angular_velocity = Vector3{};
+  try {
+    parts_->simulation->place(body, state);
+  } catch (const std::bad_alloc&) {
+    return fail(Status::kOutOfMemory);
+  }
   parts_->read();
   return fail(Status::kOk);
+}
+
+// change(settings): makes them what they are to be.
+template <typename Change>
+Status World::change(std::uint32_t body, const Change& change) {
+  if (body >= bodies().size()) return fail(Status::kUnknownInstance, body);
+  BodySettings settings = parts_->simulation->bodies()[body];
+  change(settings);
+  if (!is_usable(settings)) return fail(Status::kOutOfRange, body);
+  parts_->simulation->change(body, settings);
+  parts_->read();
+  return fail(Status::kOk);
+}
+
+Status World::set_material(std::uint32_t body, const Material& material) {
+  return change(body, [&](BodySettings& settings) { settings.material = material; });
+}
+
+Status World::set_gravity_scale(std::uint32_t body, double gravity_scale) {
+  return change(body, [&](BodySettings& settings) { settings.gravity_scale = gravity_scale; });
 }
 
 Status World::push(std::uint32_t body, const double (&impulse)[3], const double (&at)[3]) {

@@ -249,6 +249,76 @@ TEST(World, BodiesThatSleepOnEachOtherGoOnTouching) {
   }
 }
 
+TEST(World, AFixedOrKinematicBodyThatIsSetWakesWhatRestsOnItAndWhatItMeets) {
+  for (const Motion motion : {Motion::fixed, Motion::kinematic}) {
+    WorldOnGround scene(box(1, 1, 1));
+    scene.add(shift(0, 0, 0.5)).filter.motion = motion;
+    scene.add(shift(0.2, 0, 1.5));
+    scene.add(shift(0.2, 0, 2.5));
+    scene.add(shift(6, 0, 0.5));
+    World& world = scene.begin();
+    const auto sleeps = [&](std::uint32_t body) { return world.bodies()[body].sleeps; };
+    ASSERT_EQ(world.step(kStep, 60), Status::kOk);
+    if (motion == Motion::fixed) {
+      ASSERT_TRUE(sleeps(2) && sleeps(3));
+    }
+    ASSERT_TRUE(sleeps(4));
+    // It is put into the box that stands by itself, and those on it fall.
+    BodyMotion there = world.bodies()[1];
+    there.pose.translation[0] = 5.01, there.velocity[0] = motion == Motion::fixed ? 1 : 0;
+    std::shared_ptr<const World::State> state;
+    ASSERT_EQ(world.set(1, there), Status::kOk);
+    EXPECT_EQ(world.bodies()[1].velocity[0], 0);
+    EXPECT_FALSE(sleeps(2) || sleeps(3));
+    EXPECT_TRUE(sleeps(4));
+    ASSERT_EQ(world.save(state), Status::kOk);
+    for (const bool again : {false, true}) {
+      ASSERT_EQ(world.step(kStep), Status::kOk);
+      EXPECT_FALSE(sleeps(4)) << again;  // by contact, so a step later
+      if (!again) {
+        ASSERT_EQ(world.restore(*state), Status::kOk);
+      }
+    }
+    ASSERT_EQ(world.step(kStep, 60), Status::kOk);
+    EXPECT_NEAR(world.bodies()[2].centre[2], 0.5, 1e-3);
+    EXPECT_GT(world.bodies()[4].centre[0], 6.009);  // out of it, but for the slop
+    for (const ObjectPair& pair : world.touching())
+      EXPECT_FALSE(pair.a == 0 && pair.b == 1 && motion == Motion::fixed);
+  }
+}
+
+TEST(World, MaterialsAndGravityMayChangeAndWake) {
+  const double slope = std::atan(0.3);
+  WorldOnGround scene(box(1, 1, 0.5f));
+  scene.add(shift(0, 0, 0.25));
+  World& world = scene.begin({.gravity = {kGravity * std::sin(slope), 0, -kGravity * std::cos(slope)}});
+  ASSERT_EQ(world.step(kStep, 60), Status::kOk);
+  ASSERT_TRUE(world.bodies()[1].sleeps);
+  std::shared_ptr<const World::State> state;
+  ASSERT_EQ(world.save(state), Status::kOk);
+  ASSERT_EQ(world.set_material(1, {}), Status::kOk);
+  EXPECT_TRUE(world.bodies()[1].sleeps);  // it is what it was
+  for (const std::uint32_t body : {1, 0}) {
+    // Of the block, or of the ground, which is fixed: the mean with 0.5 is 0.2.
+    ASSERT_EQ(world.set_material(body, {.friction = 0.08}), Status::kOk);
+    EXPECT_FALSE(world.bodies()[1].sleeps);
+    ASSERT_EQ(world.step(kStep, 60), Status::kOk);
+    const double gained = kGravity * (std::sin(slope) - 0.2 * std::cos(slope));
+    EXPECT_NEAR(world.bodies()[1].velocity[0], gained, 0.02 * gained);
+    ASSERT_EQ(world.restore(*state), Status::kOk);
+    ASSERT_EQ(world.step(kStep, 60), Status::kOk);
+    EXPECT_TRUE(world.bodies()[1].sleeps) << body;  // which has its friction again
+  }
+  ASSERT_EQ(world.set_gravity_scale(1, -0.5), Status::kOk);
+  ASSERT_EQ(world.step(kStep, 60), Status::kOk);
+  EXPECT_NEAR(world.bodies()[1].velocity[2], 0.5 * kGravity * std::cos(slope), 1e-9);
+  ASSERT_EQ(world.restore(*state), Status::kOk);
+  EXPECT_TRUE(world.bodies()[1].sleeps);
+  EXPECT_EQ(world.set_gravity_scale(2, 1), Status::kUnknownInstance);
+  EXPECT_EQ(world.set_gravity_scale(1, kNan), Status::kOutOfRange);
+  EXPECT_EQ(world.set_material(1, {.restitution = 1.5}), Status::kOutOfRange);
+}
+
 TEST(World, ARodThatSpinsFastKeepsItsEnergy) {
   WorldOnGround scene(box(1, 0.04f, 0.04f));
   BodyDescription& rod = scene.add(shift(0, 0, 5));

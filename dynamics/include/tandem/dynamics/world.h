@@ -148,8 +148,16 @@ class World {
   double mass_of(std::uint32_t body) const;
 
   /// Puts a body elsewhere or gives it other velocities, and wakes it; `sleeps` and `centre` are not looked
-  /// at. Result: kOk; kUnknownInstance; kPoseNotRigid; kOutOfRange where a number is not finite.
+  /// at. A fixed or kinematic body wakes what touches it or is joined to it, there and at its new place; a
+  /// fixed one has no velocities. Result: kOk; kUnknownInstance; kPoseNotRigid; kOutOfRange where a number is
+  /// not finite; kOutOfMemory.
   Status set(std::uint32_t body, const BodyMotion& motion);
+
+  /// Gives a body another material, or lets another part of gravity act on it, from the next step on; save()
+  /// keeps both. Where that is not what it was, the body wakes, and of a fixed or kinematic body what touches
+  /// it or is joined to it. Result: kOk; kUnknownInstance; kOutOfRange of numbers that set_bodies() refuses.
+  Status set_material(std::uint32_t body, const Material& material);
+  Status set_gravity_scale(std::uint32_t body, double gravity_scale);
 
   /// Adds to a moving body's velocities what an impulse at a point of the world does, and wakes it. Result:
   /// kOk; kUnknownInstance; kOutOfRange where a number is not finite.
@@ -172,6 +180,8 @@ class World {
 
  private:
   struct Parts;
+  template <typename Change>
+  Status change(std::uint32_t body, const Change& change);
   Status fail(Status status, std::uint64_t where = 0) const;
   std::unique_ptr<Parts> parts_;
 };

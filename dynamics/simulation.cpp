@@ -33,7 +33,7 @@ Simulation::Simulation(std::vector<BodyProperties> bodies, std::vector<BodyState
       threads_(options.threads),
       joints_(std::move(parts_.joints)),
       joint_memory_(joints_.size()) {
-  for (const Joint& joint : joints_) joined_.push_back({joint.a, joint.b});
+  find_joined();
   follow_joints(0);
   if (parts_.solver == nullptr) parts_.solver = make_step_solver(options.solver);
   sleep_.start(bodies_.size());
@@ -104,14 +104,19 @@ void Simulation::solve(StepRecord& record) {
   islands_ = find_islands(acting_, contacts, joined_);
   std::vector<ContactImpulse> impulses(contacts.size());
   if (options_.solver.warm_start) impulses = cache_.impulses();
+  done_.assign(contacts.size(), {});
+  std::vector<double> approach;
+  approach.reserve(contacts.size());
+  for (const ContactPoint& contact : contacts) approach.push_back(approach_of(contact, states_));
   const std::vector<BodyState> before = parts_.continuous ? states_ : std::vector<BodyState>();
   parts_.solver->step({acting_, contacts, islands_, options_.dt, pulls_, step_, cache_.is_cold(), threads_,
-                       joints_, joint_memory_},
+                       joints_, joint_memory_, done_},
                       states_, impulses);
   if (parts_.continuous) parts_.continuous->limit(acting_, before, states_, options_.solver.slop);
   follow_joints(options_.dt);
+  break_joints();
   cache_.remember(impulses);
-  touches_.update(contacts, impulses, idle());
+  touches_.update(contacts, done_, approach, idle());
   record.residual_max = parts_.solver->statistics().residual;
   record.residual_rms = parts_.solver->statistics().residual_rms;
   record.islands = parts_.solver->statistics().islands;
@@ -121,7 +126,8 @@ void Simulation::solve(StepRecord& record) {
 void Simulation::sleep() {
   if (!options_.sleep.enabled) return;
   std::vector<std::uint8_t> driven;
-  for (const Joint& joint : joints_) driven.push_back(joint.speed != 0 && joint.most_effort > 0);
+  for (const Joint& joint : joints_)
+    driven.push_back(joint.holds && joint.speed != 0 && joint.most_effort > 0);
   sleep_.wake_touched(acting_, cache_.contacts(), joined_);
   wake_beside_placed();
   sleep_.fall_asleep(bodies_, states_, islands_, options_.sleep, options_.dt, driven);
@@ -193,7 +199,7 @@ void Simulation::wake(std::uint32_t body) {
       const std::uint32_t other = pair.a == body ? pair.b : pair.a;
       if ((pair.a == body || pair.b == body) && other != kNoIndex) sleep_.wake(other);
     };
-    std::ranges::for_each(touches_.touching(), wake_other);
+    for (const WorldTouch& touch : touches_.touching()) wake_other({touch.a, touch.b});
     std::ranges::for_each(joined_, wake_other);
   }
   update_acting();
@@ -223,10 +229,79 @@ void Simulation::follow_joints(double time) {
 
 void Simulation::set_motor(std::uint32_t joint, double speed, double most_effort) {
   joints_[joint].speed = speed, joints_[joint].most_effort = most_effort;
-  for (const std::uint32_t body : {joints_[joint].a, joints_[joint].b}) {
+  wake_joined(joints_[joint]);
+  update_acting();
+}
+
+std::uint32_t Simulation::add_joint(const Joint& joint) {
+  const auto free = std::ranges::find_if(joints_, &Joint::is_gone);
+  const auto place = static_cast<std::uint32_t>(free - joints_.begin());
+  // What may throw comes first.
+  if (!joint.may_touch) forget_contacts({std::min(joint.a, joint.b), std::max(joint.a, joint.b)});
+  const std::size_t count = std::max<std::size_t>(joints_.size(), place + 1);
+  joint_memory_.reserve(count), joined_.reserve(count), joints_.resize(count), joint_memory_.resize(count);
+  joints_[place] = joint;
+  joint_memory_[place] = {};
+  follow(joint, state_of(joint.a, states_), state_of(joint.b, states_), 0, joint_memory_[place]);
+  find_joined();
+  wake_joined(joint);
+  update_acting();
+  return place;
+}
+
+void Simulation::remove_joint(std::uint32_t joint) {
+  wake_joined(joints_[joint]);
+  joints_[joint] = {};
+  joints_[joint].a = joints_[joint].b = kNoIndex, joints_[joint].holds = false;
+  joint_memory_[joint] = {};
+  find_joined();
+  update_acting();
+}
+
+void Simulation::find_joined() {
+  joined_.clear();
+  for (const Joint& joint : joints_) joined_.push_back(joint.pair());
+}
+
+void Simulation::wake_joined(const Joint& joint) {
+  for (const std::uint32_t body : {joint.a, joint.b}) {
     if (body != kNoIndex) sleep_.wake(body);
   }
-  update_acting();
+}
+
+// The pair is asked for contacts when it is next near, as if it had never been.
+void Simulation::forget_contacts(const ObjectPair& pair) {
+  const auto entries = cache_.entries();
+  const auto posed = parts_.contacts->posed();
+  std::vector<CachedContact> others(entries.begin(), entries.end());
+  std::vector<PosedBodies> other_bodies(posed.begin(), posed.end());
+  std::erase_if(others, [&](const CachedContact& entry) { return entry.pair == pair; });
+  std::erase_if(other_bodies, [&](const PosedBodies& of) { return of.pair == pair; });
+  parts_.contacts->resume(other_bodies);
+  cache_.restore(std::move(others));
+}
+
+// A joint that does not hold does nothing from the step after it broke.
+void Simulation::break_joints() {
+  broken_.clear();
+  for (std::size_t i = 0; i < joints_.size(); ++i) {
+    if (!joints_[i].holds) joint_memory_[i].impulse = joint_memory_[i].done = {};
+  }
+  for (const std::uint32_t i : islands_.joints) {
+    const Joint& joint = joints_[i];
+    if (joint.breaking_force == INFINITY && joint.breaking_torque == INFINITY) continue;
+    const JointImpulse impulse =
+        impulse_of(joint, joint_memory_[i], state_of(joint.a, states_), state_of(joint.b, states_));
+    if (norm(impulse.linear) > options_.dt * joint.breaking_force ||
+        norm(impulse.turning) > options_.dt * joint.breaking_torque)
+      broken_.push_back(i);
+  }
+  std::ranges::sort(broken_);
+  for (const std::uint32_t i : broken_) {
+    joints_[i].holds = false;
+    wake_joined(joints_[i]);
+  }
+  find_joined();
 }
 
 SimulationState Simulation::save() const {
@@ -264,6 +339,8 @@ void Simulation::restore(SimulationState state) {
   touches_.restore(std::move(state.touching));
   joints_ = std::move(state.joints);
   joint_memory_ = std::move(state.joint_memory);
+  broken_.clear();
+  find_joined();
   update_acting();
 }
 

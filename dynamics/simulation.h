@@ -54,7 +54,7 @@ struct SimulationState {
   std::vector<BodyForce> forces;       ///< empty: there are none
   std::vector<BodySettings> settings;  ///< of each body; empty: those that the bodies have
   std::vector<std::uint8_t> placed;    ///< see Simulation::place(); empty: none was
-  std::vector<ObjectPair> touching;    ///< of Touches
+  std::vector<WorldTouch> touching;    ///< of Touches
   std::vector<Joint> joints;           ///< with what their motors ask for
   std::vector<JointMemory> joint_memory;
 };
@@ -101,8 +101,9 @@ class Simulation {
   /// Sets how long the next steps are, in seconds.
   void set_step(double dt) { options_.dt = dt; }
 
-  /// The contacts of the last step, and their impulses.
-  const ContactCache& contacts() const { return cache_; }
+  /// Return the contacts of the last step, and what each of them did in it.
+  std::span<const ContactPoint> contacts() const { return cache_.contacts(); }
+  std::span<const ContactImpulse> impulses() const { return done_; }
 
   /// The pairs of bodies that touched in the last step.
   const Touches& touches() const { return touches_; }
@@ -113,6 +114,17 @@ class Simulation {
 
   /// Gives a joint's motor another target and greatest effort, and wakes what it joins.
   void set_motor(std::uint32_t joint, double speed, double most_effort);
+
+  /// Adds a joint in the first place from which one has been removed, else at the end, and wakes what it
+  /// joins. If these may not touch, what was remembered of their contacts is forgotten; that no others are
+  /// found is up to the filter. Returns the place.
+  std::uint32_t add_joint(const Joint& joint);
+
+  /// Removes a joint, and wakes what it joined. Others keep their places.
+  void remove_joint(std::uint32_t joint);
+
+  /// Returns the joints that broke in the last step, ascending. Such a joint keeps its place.
+  std::span<const std::uint32_t> broken() const { return broken_; }
 
   bool sleeps(std::uint32_t body) const { return sleep_.sleeps(body); }
 
@@ -130,7 +142,11 @@ class Simulation {
   void sleep();
   void wake_beside_placed();
   void update_acting();
+  void wake_joined(const Joint& joint);
+  void find_joined();
+  void forget_contacts(const ObjectPair& pair);
   void follow_joints(double time);
+  void break_joints();
   std::vector<std::uint8_t> idle() const;
   void take_measures(StepRecord& record) const;
 
@@ -142,9 +158,11 @@ class Simulation {
   std::vector<Joint> joints_;
   std::vector<ObjectPair> joined_;  // the bodies of each
   std::vector<JointMemory> joint_memory_;
+  std::vector<std::uint32_t> broken_;  // in the last step
   Islands islands_;
   std::vector<ContactPoint> found_;
   ContactCache cache_;
+  std::vector<ContactImpulse> done_;  // of its contacts, in the last step
   Touches touches_;
   Sleep sleep_;
   std::vector<BodyForce> forces_;     // of each body; empty: none

@@ -178,8 +178,11 @@ TEST(World, AForceLastsUntilItIsChanged) {
 
 using Pairs = std::vector<ObjectPair>;
 
-Pairs copied(std::span<const ObjectPair> pairs) {
-  return {pairs.begin(), pairs.end()};
+template <typename Row>
+Pairs copied(std::span<const Row> rows) {
+  Pairs pairs;
+  for (const Row& row : rows) pairs.push_back({row.a, row.b});
+  return pairs;
 }
 
 TEST(World, ABallThatBouncesTwiceBeginsAndEndsToTouchInTheStepsOfTheClosedForm) {
@@ -215,6 +218,57 @@ TEST(World, ABallThatBouncesTwiceBeginsAndEndsToTouchInTheStepsOfTheClosedForm) 
       if (i == first) second = i + 1 + falls(ball.centre[2] - 0.5, ball.velocity[2]);
       EXPECT_EQ(copied(world.ended()), i == first + 1 || i == second + 1 ? touching : none) << i;
     }
+  }
+}
+
+// One ball is an island that Newton's method solves, four layers of boxes are not.
+TEST(World, WhatTouchesTellsHowHardAsMomentumSays) {
+  WorldOnGround ball(sphere(0.5, 3));
+  constexpr double kDrop = 1.3, kRestitution = 0.6;
+  ball.add(shift(0.3, 0.2, 0.5 + kDrop)).material.restitution = kRestitution;
+  World& world = ball.begin();
+  double before = 0, hardest = 0, fastest = 0;
+  for (int i = 0; i < 100; ++i) {
+    ASSERT_EQ(world.step(kStep), Status::kOk);
+    const double now = world.bodies()[1].velocity[2],
+                 needed = world.mass_of(1) * (now - before + kGravity * kStep);
+    EXPECT_EQ(world.touching().empty(), world.contacts().empty());
+    if (!world.touching().empty()) {
+      EXPECT_NEAR(world.touching()[0].impulse, needed, 1e-3 * needed + 1e-9);
+      EXPECT_NEAR(std::hypot(world.touching()[0].position[0] - 0.3, world.touching()[0].position[1] - 0.2), 0,
+                  0.03);
+      EXPECT_NEAR(world.touching()[0].position[2], 0, 0.5 * 5.1 * kStep);  // half-way to where it will be
+      hardest = std::max(hardest, world.touching()[0].impulse);
+    }
+    if (!world.began().empty()) {
+      EXPECT_EQ(world.began()[0].impulse, world.touching()[0].impulse);
+      EXPECT_EQ(world.began()[0].speed, -before);
+      fastest = std::max(fastest, -before);
+    }
+    before = now;
+  }
+  const double speed = std::sqrt(2 * kGravity * kDrop);
+  EXPECT_NEAR(hardest / (world.mass_of(1) * (1 + kRestitution) * speed), 1, 0.05);
+  ASSERT_EQ(ball.begin().step(kStep, 100), Status::kOk);
+  EXPECT_EQ(world.began()[0].impulse, hardest);  // of all bounces of the call
+  EXPECT_EQ(world.began()[0].speed, fastest);
+  EXPECT_NEAR(fastest, speed, kGravity * kStep);
+
+  WorldOnGround heap(box(1, 1, 1));
+  for (int i = 0; i < 100; ++i) heap.add(shift(i % 5, i / 5 % 5, 0.8 + i / 25)).velocity[2] = -3;
+  World& falls = heap.begin();
+  before = -3 * 100;
+  for (int i = 0; i < 20; ++i) {
+    ASSERT_EQ(falls.step(kStep), Status::kOk);
+    double now = 0, told = 0, by_contacts = 0;
+    for (const BodyMotion& body : falls.bodies()) now += body.velocity[2];
+    const double needed = falls.mass_of(1) * (now - before + 100 * kGravity * kStep);
+    for (const WorldTouch& touch : falls.touching()) told += touch.a == 0 ? touch.impulse : 0;
+    for (const WorldContact& contact : falls.contacts())
+      by_contacts += contact.a == 0 ? contact.impulse[2] : 0;
+    EXPECT_NEAR(told, needed, 1e-4 * needed + 1);
+    EXPECT_NEAR(by_contacts, needed, 1e-4 * needed + 1);
+    before = now;
   }
 }
 
@@ -282,7 +336,7 @@ TEST(World, AFixedOrKinematicBodyThatIsSetWakesWhatRestsOnItAndWhatItMeets) {
     ASSERT_EQ(world.step(kStep, 60), Status::kOk);
     EXPECT_NEAR(world.bodies()[2].centre[2], 0.5, 1e-3);
     EXPECT_GT(world.bodies()[4].centre[0], 6.009);  // out of it, but for the slop
-    for (const ObjectPair& pair : world.touching())
+    for (const WorldTouch& pair : world.touching())
       EXPECT_FALSE(pair.a == 0 && pair.b == 1 && motion == Motion::fixed);
   }
 }

@@ -112,7 +112,7 @@ void Simulation::solve(StepRecord& record) {
   parts_.solver->step({acting_, contacts, islands_, options_.dt, pulls_, step_, cache_.is_cold(), threads_,
                        joints_, joint_memory_, done_},
                       states_, impulses);
-  if (parts_.continuous) parts_.continuous->limit(acting_, before, states_, options_.solver.slop);
+  if (parts_.continuous) parts_.continuous->limit(acting_, joined_, before, states_, options_.solver.slop);
   follow_joints(options_.dt);
   break_joints();
   cache_.remember(impulses);

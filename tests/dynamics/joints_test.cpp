@@ -327,6 +327,36 @@ TEST(Joints, AJointInAHeapTellsWhatMomentumSays) {
   }
 }
 
+// Where each body was stopped by itself, anchors parted by up to two links.
+TEST(Joints, AChainThatAThinPlateLeadsHoldsTogetherWhereContinuousMotionStopsIt) {
+  for (const JointKind kind : {JointKind::ball, JointKind::hinge}) {
+    for (const double tilt : {0.0, 0.05, 0.2, 0.6}) {
+      JointedScene scene;
+      scene.add_box({0.1, 6, 6}, shift(3.05, 0, 0)).filter.motion = Motion::fixed;
+      const Pose pose = turn(1, tilt);
+      scene.add_box({0.01, 0.5, 0.5}, pose);
+      for (std::uint32_t i = 2; i < 12; ++i) {
+        scene.add_box({0.2, 0.05, 0.05}, after(pose, shift(0.29 - 0.2 * i, 0, 0)));
+        const Vector3 at = apply(pose, {0.39 - 0.2 * i, 0, 0});
+        scene.joints.push_back(
+            {.kind = kind, .a = i - 1, .b = i, .anchor = {at.x, at.y, at.z}, .axis = {0, 1, 0}});
+      }
+      for (std::size_t i = 1; i < scene.bodies.size(); ++i) scene.bodies[i].velocity[0] = 30;
+      World& world = scene.begin({.gravity = {0, 0, 0}, .sleeping = false, .continuous = true});
+      const double energy = scene.sums().kinetic;
+      int last = 0;  // step in which anchors are apart
+      for (int i = 0; i < 60; ++i) {
+        ASSERT_EQ(world.step(kStep), Status::kOk);
+        ASSERT_LT(scene.most_apart(), 0.05) << tilt << ' ' << i;
+        ASSERT_LT(scene.sums().kinetic, (1 + 1e-9) * energy);
+        for (const BodyMotion& body : world.bodies().subspan(1)) ASSERT_LT(body.centre[0], 3);
+        if (scene.most_apart() > 1e-3 * 0.2) last = i;
+      }
+      EXPECT_LT(last, 30);  // it meets the wall in the sixth; 23
+    }
+  }
+}
+
 TEST(Joints, AKinematicBodyCarriesWhatIsJoinedToIt) {
   JointedScene scene;
   BodyDescription& table = scene.add_box({1, 1, 0.1}, shift(0, 0, 0));

@@ -118,6 +118,21 @@ class Masses {
   std::vector<std::optional<BodyProperties>> of_;
 };
 
+SimulationOptions simulation_options(const WorldOptions& options, std::span<const AssetView> assets,
+                                     std::span<const BodyProperties> bodies) {
+  SimulationOptions to;
+  to.gravity = vector_of(options.gravity);
+  to.solver.friction = options.friction, to.solver.restitution = options.restitution;
+  to.solver.slop = options.slop >= 0 ? options.slop : default_slop(assets, bodies);
+  to.solver.rolling_resistance =
+      options.rolling_resistance >= 0 ? options.rolling_resistance : 16 * to.solver.slop;
+  to.solver.substeps = options.substeps;
+  to.sleep.enabled = options.sleeping;
+  to.sleep.speed = kSleepSpeed;
+  to.threads = options.threads;
+  return to;
+}
+
 Status check(const JointDescription& joint, std::span<const BodyProperties> bodies) {
   bool moves = false;
   for (const std::uint32_t body : {joint.a, joint.b}) {
@@ -192,16 +207,7 @@ Status World::set_bodies(std::span<const BodyDescription> bodies, const WorldOpt
     parts.excluded.assign(excluded.begin(), excluded.end());
     const Status filters = parts.filter_pairs(joined);
     if (filters != Status::kOk) return fail(filters);
-    SimulationOptions to;
-    to.gravity = vector_of(options.gravity);
-    to.solver.friction = options.friction, to.solver.restitution = options.restitution;
-    to.solver.slop = options.slop >= 0 ? options.slop : default_slop(parts.assets, all);
-    to.solver.rolling_resistance =
-        options.rolling_resistance >= 0 ? options.rolling_resistance : 16 * to.solver.slop;
-    to.solver.substeps = options.substeps;
-    to.sleep.enabled = options.sleeping;
-    to.sleep.speed = kSleepSpeed;
-    to.threads = options.threads;
+    const SimulationOptions to = simulation_options(options, parts.assets, all);
     SimulationParts of;
     of.contacts = make_scene_contacts(parts.assets, options.threads, &parts.filter);
     of.ahead = std::make_unique<ContactsAhead>(parts.assets, options.threads, &parts.filter);

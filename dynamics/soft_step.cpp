@@ -399,10 +399,11 @@ void SoftSolver::write(const Step& step, std::span<BodyState> states,
     const Vector3 turning = {of(turns[0]), of(turns[1]), of(turns[2])};
     for (std::uint32_t i = 0; i < pair.contacts; ++i) {
       const std::uint32_t contact = contacts_[pair.first_contact + i], row = groups_[pair.group].first + i;
-      const auto [first, second] = Tangents(step.input.contacts[contact].normal);
+      const Tangents across(step.input.contacts[contact].normal);
       const SoftFriction& friction = frictions_[row];
       const auto impulse = [&](double scale, double normal, double along_first, double along_second) {
-        return ContactImpulse{scale * normal, scale * (along_first * first + along_second * second),
+        return ContactImpulse{scale * normal,
+                              scale * (along_first * across.first + along_second * across.second),
                               substeps / pair.contacts * turning};
       };
       impulses[contact] = impulse(substeps, of(normals_[row].impulse), of(friction.first_impulse),

@@ -58,6 +58,13 @@ struct Keeping {
                                                          ///< they too are kept
 };
 
+/// Returns the filter, or one that excludes nothing where it is null, with these motions.
+inline PairFilter with_motions(const PairFilter* filter, const std::vector<Motion>& motion) {
+  PairFilter with = filter != nullptr ? *filter : PairFilter{};
+  with.motion = motion.data();
+  return with;
+}
+
 /// A simulation has its contacts from one of these.
 class ContactFinder {
  public:

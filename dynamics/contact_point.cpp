@@ -14,4 +14,12 @@ void carry(ContactPoint& contact, const ContactAnchor& anchor, std::span<const B
   contact.depth = anchor.depth - dot(contact.normal, on_b - on_a);
 }
 
+double approach_of(const ContactPoint& contact, std::span<const BodyState> states) {
+  const auto velocity = [&](std::uint32_t body) {
+    const BodyState& state = states[body];
+    return state.velocity + cross(state.angular_velocity, contact.position - state.position);
+  };
+  return dot(contact.normal, velocity(contact.body_a) - velocity(contact.body_b));
+}
+
 }  // namespace tandem::dynamics

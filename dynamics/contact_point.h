@@ -33,6 +33,9 @@ ContactAnchor anchor_of(const ContactPoint& contact, std::span<const BodyState> 
 /// what these have moved apart along the normal; the depth may become negative. The normal stays.
 void carry(ContactPoint& contact, const ContactAnchor& anchor, std::span<const BodyState> states);
 
+/// Returns how fast the bodies approach each other at the contact, along its normal.
+double approach_of(const ContactPoint& contact, std::span<const BodyState> states);
+
 /// The impulse of a contact in a step: an impulse on b, the opposite one on a.
 struct ContactImpulse {
   double normal = 0;   ///< along the contact's normal, >= 0

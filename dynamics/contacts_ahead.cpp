@@ -26,7 +26,7 @@ double rounding_of(const BodiesAhead& of, const ObjectPair& pair) {
 }  // namespace
 
 ContactsAhead::ContactsAhead(std::span<const AssetView> assets, std::uint32_t threads,
-                             const PairFilter& filter)
+                             const PairFilter* filter)
     : filter_(filter) {
   for (Scene* scene : {&scene_, &moved_}) {
     require(scene->set_threads(threads), *scene);
@@ -92,8 +92,7 @@ void ContactsAhead::place(const BodiesAhead& of) {
     if (of.is_idle(static_cast<std::uint32_t>(i))) motion_[i] = Motion::fixed;
     turning_[i] = motion_[i] == Motion::fixed ? 0 : of.bodies[i].radius * norm(of.states[i].angular_velocity);
   }
-  filter_.motion = motion_.data();
-  require(scene_.place(instances_, filter_), scene_);
+  require(scene_.place(instances_, with_motions(filter_, motion_)), scene_);
 }
 
 void ContactsAhead::Ways::find(std::span<const BodyProperties> bodies, std::span<const BodyState> from,

@@ -28,9 +28,9 @@ struct AheadState {
 /// their normals. So two faces that will meet have the points of a patch, and not one.
 class ContactsAhead {
  public:
-  /// The data that the assets and the filter look at must outlive this. The filter's motions are not looked
-  /// at. Throws QueryFailed.
-  ContactsAhead(std::span<const AssetView> assets, std::uint32_t threads, const PairFilter& filter = {});
+  /// What the assets and the filter look at, and the filter, must outlive this. filter: or null; its motions
+  /// are not looked at, and what it excludes may change between calls. Throws QueryFailed.
+  ContactsAhead(std::span<const AssetView> assets, std::uint32_t threads, const PairFilter* filter = nullptr);
 
   /// Finds which bodies are near each other. Throws QueryFailed.
   void find_near(const BodiesAhead& of);
@@ -106,7 +106,7 @@ class ContactsAhead {
   void find_points_of_moved();
   void add_points_to(std::vector<ContactPoint>& found) const;
 
-  PairFilter filter_;
+  const PairFilter* filter_;
   Scene scene_, moved_;  // all bodies; two of each approach, moved
   DistanceQuery distances_;
   ContactQuery contacts_;

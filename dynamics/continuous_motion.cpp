@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "kernels/common/union_find.h"
+
 namespace tandem::dynamics {
 namespace {
 
@@ -37,7 +39,7 @@ Quaternion turned(const Quaternion& orientation, const Vector3& turn) {
 }  // namespace
 
 ContinuousMotion::ContinuousMotion(std::span<const AssetView> shapes, std::uint32_t threads,
-                                   const PairFilter& filter)
+                                   const PairFilter* filter)
     : filter_(filter) {
   require(moving_.set_threads(threads), moving_);
   require(moving_.set_assets(shapes), moving_);
@@ -123,6 +125,19 @@ double ContinuousMotion::stop_of_touching(std::span<const BodyProperties> bodies
   return std::min(1.0, kMostSamples / samples);
 }
 
+void ContinuousMotion::find_groups(std::span<const BodyProperties> bodies,
+                                   std::span<const ObjectPair> joined) {
+  UnionFind sets(bodies.size());
+  const auto moves = [&](std::uint32_t body) {
+    return body != kNoIndex && bodies[body].motion == Motion::moving;
+  };
+  for (const ObjectPair& pair : joined) {
+    if (moves(pair.a) && moves(pair.b)) sets.join(pair.a, pair.b);
+  }
+  group_.resize(bodies.size());
+  for (std::uint32_t i = 0; i < group_.size(); ++i) group_[i] = sets.find(i);
+}
+
 // Result: whether a body stops earlier than it did.
 bool ContinuousMotion::stop(std::span<const BodyProperties> bodies, std::span<const BodyState> before,
                             double slop) {
@@ -137,8 +152,7 @@ bool ContinuousMotion::stop(std::span<const BodyProperties> bodies, std::span<co
       motion_[i].centre[k] = at(before[i].position, k);
     }
   }
-  filter_.motion = fast_.data();
-  require(moving_.place(instances_, filter_), moving_);
+  require(moving_.place(instances_, with_motions(filter_, fast_)), moving_);
   require(query_.find(moving_, {.motion = motion_, .duration = 1, .tolerance = 1e-8}), moving_);
   stop_.assign(bodies.size(), 1);
   bool earlier = false;
@@ -154,18 +168,21 @@ bool ContinuousMotion::stop(std::span<const BodyProperties> bodies, std::span<co
     if (part > 1 - 1e-9) continue;
     for (const std::uint32_t body : {pair.a, pair.b}) {
       if (bodies[body].motion != Motion::moving) continue;
-      stop_[body] = std::min(stop_[body], part);
-      if (impact.status != ImpactStatus::found) held_[body] = std::min(held_[body], part);
+      double& stop = stop_[group_[body]];
+      stop = std::min(stop, part);
+      double& held = held_[group_[body]];
+      if (impact.status != ImpactStatus::found) held = std::min(held, part);
     }
     earlier = true;
   }
-  for (std::size_t i = 0; i < bodies.size(); ++i) part_[i] *= stop_[i];
+  for (std::size_t i = 0; i < bodies.size(); ++i) part_[i] *= stop_[group_[i]];
   return earlier;
 }
 
-void ContinuousMotion::limit(std::span<const BodyProperties> bodies, std::span<const BodyState> before,
-                             std::span<BodyState> after, double slop) {
+void ContinuousMotion::limit(std::span<const BodyProperties> bodies, std::span<const ObjectPair> joined,
+                             std::span<const BodyState> before, std::span<BodyState> after, double slop) {
   if (!find_fast(bodies, before, after)) return;
+  find_groups(bodies, joined);
   for (int round = 0; round < kMostRounds && stop(bodies, before, slop); ++round) {
   }
   for (std::size_t i = 0; i < bodies.size(); ++i) {
@@ -174,7 +191,7 @@ void ContinuousMotion::limit(std::span<const BodyProperties> bodies, std::span<c
     after[i].position = before[i].position + part_[i] * way_[i];
     after[i].orientation = turned(before[i].orientation, part_[i] * turn_[i]);
     const auto at_impact = [&](const Vector3& from, const Vector3& to) {
-      return held_[i] * (from + part_[i] * (to - from));
+      return held_[group_[i]] * (from + part_[i] * (to - from));
     };
     // Spins are those in the body's frame, or a rod that turns about its axis would turn about another one.
     const Vector3 spin = at_impact(rotated(conjugated(before[i].orientation), before[i].angular_velocity),

@@ -14,23 +14,29 @@ namespace tandem::dynamics {
 /// is left of the step's way is lost. Velocities are those of the time of impact; of bodies that touched
 /// already, and that contacts did not hold, they are lost with the way, so that no energy comes of it.
 ///
+/// Bodies that joints hold together stop together, at the first impact of any of them, and lose velocities
+/// together, so that their anchors come apart by no more than by what bodies turn in the step.
+///
 /// A body is fast where one of its points moves by more than half the inner radius of the thinnest closed
 /// shape: half the least side of its bounds. Steps without a fast body cost next to nothing.
 class ContinuousMotion {
  public:
-  /// The data that the shapes and the filter look at must outlive this. The filter names the pairs that may
-  /// meet; its motions are not looked at. Throws QueryFailed where a shape cannot be taken.
-  ContinuousMotion(std::span<const AssetView> shapes, std::uint32_t threads, const PairFilter& filter = {});
+  /// What the shapes and the filter look at, and the filter, must outlive this. filter: names the pairs that
+  /// may meet, or null; its motions are not looked at, and what it excludes may change between calls. Throws
+  /// QueryFailed where a shape cannot be taken.
+  ContinuousMotion(std::span<const AssetView> shapes, std::uint32_t threads,
+                   const PairFilter* filter = nullptr);
 
-  /// Takes back what of the way from `before` to `after` leads through other bodies. Throws
-  /// QueryFailed where a query fails.
-  void limit(std::span<const BodyProperties> bodies, std::span<const BodyState> before,
-             std::span<BodyState> after, double slop);
+  /// Takes back what of the way from `before` to `after` leads through other bodies. joined: the bodies of
+  /// each joint; kNoIndex is the world. Throws QueryFailed where a query fails.
+  void limit(std::span<const BodyProperties> bodies, std::span<const ObjectPair> joined,
+             std::span<const BodyState> before, std::span<BodyState> after, double slop);
 
  private:
   double inner_radius(const BodyProperties& body) const { return inner_radius_[body.shape]; }
   bool find_fast(std::span<const BodyProperties> bodies, std::span<const BodyState> before,
                  std::span<const BodyState> after);
+  void find_groups(std::span<const BodyProperties> bodies, std::span<const ObjectPair> joined);
   bool stop(std::span<const BodyProperties> bodies, std::span<const BodyState> before, double slop);
   double stop_of(const Impact& impact, const ObjectPair& pair, double reach, double slop) const;
   double stop_of_touching(std::span<const BodyProperties> bodies, std::span<const BodyState> before,
@@ -38,18 +44,19 @@ class ContinuousMotion {
   double depth_at(std::span<const BodyProperties> bodies, std::span<const BodyState> before,
                   const ObjectPair& pair, double part);
 
-  PairFilter filter_;
+  const PairFilter* filter_;
   Scene moving_, two_;  // all bodies, and two of them
   ImpactQuery query_;
   ContactQuery contacts_;
   ManifoldQuery manifolds_;
   std::vector<double> inner_radius_;  // of each shape; infinite where it is not closed
 
-  std::vector<Motion> fast_;         // moving: fast; fixed: not
-  std::vector<Vector3> turn_;        // of each body, in the whole step
-  std::vector<Vector3> way_;         // of its centre of mass
-  std::vector<double> part_, stop_;  // of both, that it goes; and of that, in a round
-  std::vector<double> held_;         // the least such part of a pair that touches already
+  std::vector<Motion> fast_;          // moving: fast; fixed: not
+  std::vector<Vector3> turn_;         // of each body, in the whole step
+  std::vector<Vector3> way_;          // of its centre of mass
+  std::vector<double> part_, stop_;   // of both, that it goes; and of that, in a round
+  std::vector<double> held_;          // the least such part of a pair that touches already
+  std::vector<std::uint32_t> group_;  // the first of the bodies that joints hold together with each
   std::vector<Instance> instances_;
   std::vector<RigidMotion> motion_;
 };

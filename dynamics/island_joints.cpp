@@ -103,7 +103,8 @@ void JointSpan::end_with(const std::vector<Vector6>& velocity, const std::vector
     const Joint& joint = input_.joints[problem_.joints[i]];
     const JointRow& at = problem_.joint_rows[row];
     const BodyState a = state(joint.a, at.a), b = state(joint.b, at.b);
-    JointMemory memory = {{}, first_[i].position};
+    JointMemory memory;
+    memory.position = first_[i].position;
     follow(joint, a, b, input_.dt, memory);
     last_[i] = geometry_of(joint, a, b, memory.position);
     const JointDirections directions = directions_of(joint, last_[i]);

@@ -153,12 +153,27 @@ JointDirections directions_of(const Joint& joint, const JointGeometry& g) {
   return rows.take();
 }
 
+JointImpulse impulse_of(const Joint& joint, const JointMemory& memory, const BodyState& a,
+                        const BodyState& b) {
+  const JointGeometry geometry = geometry_of(joint, a, b, memory.position);
+  const JointDirections directions = directions_of(joint, geometry);
+  JointImpulse sum;
+  for (std::size_t k = 0; k < directions.count; ++k) {
+    const JointDirection& row = directions.row[k];
+    const double push = memory.done[row.slot];
+    sum.linear += push * row.linear;
+    sum.turning += push * (row.angular_b - cross(geometry.arm_b, row.linear));
+    if (row.kind == JointRowKind::motor) sum.motor = push;
+  }
+  return sum;
+}
+
 Status check(const JointDescription& from) {
   const bool has_limits = from.least > -INFINITY || from.most < INFINITY;
   const bool may_be_limited = has_axis(from.kind) || from.kind == JointKind::distance;
   bool good = from.kind <= JointKind::distance && from.least <= from.most && from.least < INFINITY &&
               from.most > -INFINITY && std::isfinite(from.speed) && from.most_effort >= 0 &&
-              (may_be_limited || !has_limits) &&
+              from.breaking_force >= 0 && from.breaking_torque >= 0 && (may_be_limited || !has_limits) &&
               (has_axis(from.kind) || (from.speed == 0 && from.most_effort == 0));
   good = good && is_finite(vector_of(from.anchor)) && is_finite(vector_of(from.axis));
   if (from.kind == JointKind::distance) good = good && is_finite(vector_of(from.anchor_b)) && from.most >= 0;
@@ -183,6 +198,8 @@ Joint make_joint(const JointDescription& from, std::span<const BodyState> states
   joint.rest = conjugated(a.orientation) * b.orientation;
   joint.least = from.least, joint.most = from.most;
   joint.speed = from.speed, joint.most_effort = from.most_effort;
+  joint.breaking_force = from.breaking_force, joint.breaking_torque = from.breaking_torque;
+  joint.may_touch = from.may_touch;
   if (two_anchors && !joint.has_limits())
     joint.least = joint.most = norm(vector_of(from.anchor_b) - vector_of(from.anchor));
   if (two_anchors) joint.least = std::max(joint.least, 0.0);

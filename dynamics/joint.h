@@ -7,6 +7,7 @@
 
 #include "dynamics/rigid_body.h"
 #include "tandem/dynamics/world.h"
+#include "tandem/kernels/object_pair.h"
 
 namespace tandem::dynamics {
 
@@ -21,7 +22,14 @@ struct Joint {
   Quaternion rest;             ///< of b in a, which a slider or fixed joint holds
   double least, most;          ///< angle, way or distance
   double speed, most_effort;   ///< of the motor; none where most_effort is 0
+  double breaking_force, breaking_torque;
+  bool may_touch;
+  bool holds = true;  ///< false: it has broken or been removed
 
+  /// Returns whether it has been removed; the simulation may put another joint in its place.
+  bool is_gone() const { return a == b; }
+  /// Returns the bodies that it joins; the world with itself where it does not hold.
+  ObjectPair pair() const { return holds ? ObjectPair{a, b} : ObjectPair{kNoIndex, kNoIndex}; }
   bool has_limits() const { return least > -INFINITY || most < INFINITY; }
 };
 
@@ -30,8 +38,9 @@ inline constexpr std::size_t kMostJointRows = 7;
 
 /// What a joint keeps from step to step.
 struct JointMemory {
-  std::array<double, kMostJointRows> impulse = {};
-  double position = 0;  ///< angle, way or distance; an angle counts whole turns
+  std::array<double, kMostJointRows> impulse = {};  ///< that the next step starts with
+  double position = 0;                              ///< angle, way or distance; an angle counts whole turns
+  std::array<double, kMostJointRows> done = {};     ///< impulse in the last step; it differs in soft steps
 };
 
 /// The places and directions of a joint's parts, in the world. Rows made of the mean of two of these do no
@@ -81,14 +90,22 @@ struct JointDirections {
 /// The directions of a joint; how many, and their slots, depend on the joint alone.
 JointDirections directions_of(const Joint& joint, const JointGeometry& geometry);
 
+/// The impulse of a joint in a step, on b at its anchor; on a there the opposite one.
+struct JointImpulse {
+  Vector3 linear, turning;
+  double motor = 0;  ///< along the axis, of the motor alone
+};
+JointImpulse impulse_of(const Joint& joint, const JointMemory& memory, const BodyState& a,
+                        const BodyState& b);
+
 /// Returns the speed by which the joint's position changes; 0 of a joint that has none.
 double free_speed(const Joint& joint, const JointGeometry& geometry, const BodyState& a, const BodyState& b);
 
 /// Takes where the joint is after bodies have moved for a time. Its speed says how often a hinge has turned.
 void follow(const Joint& joint, const BodyState& a, const BodyState& b, double time, JointMemory& memory);
 
-/// Returns whether the joint's anchors, limits, motor and axis are such as its kind can have; kJoinsNothing
-/// is the caller's. Result: kOk, kBadJoint or kNoAxis.
+/// Returns whether the joint's anchors, limits, motor, axis and breaking limits are such as its kind can
+/// have; kJoinsNothing is the caller's. Result: kOk, kBadJoint or kNoAxis.
 Status check(const JointDescription& from);
 
 /// Makes the joint of bodies that stand like this. Condition: check() is kOk, and there are the bodies.

@@ -8,8 +8,16 @@
 
 namespace tandem::dynamics {
 
+/// The numbers of a body that callers may change between steps.
+struct BodySettings {
+  Material material;
+  double gravity_scale = 1;  ///< the part of gravity that acts on it
+
+  friend bool operator==(const BodySettings&, const BodySettings&) = default;
+};
+
 /// The properties of a body, apart from where it is.
-struct BodyProperties {
+struct BodyProperties : BodySettings {
   std::uint32_t shape = 0;                ///< by place in the list of assets
   Motion motion = Motion::moving;         ///< never sleeping; a kinematic one keeps its velocities
   double mass = 1;                        ///< kg; that of a fixed body is not looked at
@@ -18,8 +26,6 @@ struct BodyProperties {
   Vector3 centre;                         ///< of mass, in the file's coordinates
   Matrix3 inertia = Matrix3::identity();  ///< about the centre, along the file's axes
   Matrix3 inverse_inertia = Matrix3::identity();
-  Material material;
-  double gravity_scale = 1;  ///< the part of gravity that acts on it
 };
 
 /// The state of a body: where it is and how it moves, in the world.

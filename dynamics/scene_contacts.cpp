@@ -47,7 +47,7 @@ namespace {
 
 class SceneContacts : public ContactFinder {
  public:
-  SceneContacts(std::span<const AssetView> assets, std::uint32_t threads, const PairFilter& filter)
+  SceneContacts(std::span<const AssetView> assets, std::uint32_t threads, const PairFilter* filter)
       : filter_(filter) {
     require(scene_.set_threads(threads), scene_);
     require(scene_.set_assets(assets), scene_);
@@ -59,8 +59,7 @@ class SceneContacts : public ContactFinder {
     report_ = {};
     motion_.assign(bodies.size(), Motion::moving);
     for (std::size_t i = 0; i < idle.size(); ++i) motion_[i] = idle[i] != 0 ? Motion::fixed : Motion::moving;
-    filter_.motion = motion_.data();
-    require(scene_.place(bodies, filter_), scene_);
+    require(scene_.place(bodies, with_motions(filter_, motion_)), scene_);
     report_.times.update = stopwatch.lap();
     if (!keeping.near) require(scene_.find_pairs(), scene_);
     const std::span<const ObjectPair> asked =
@@ -81,7 +80,7 @@ class SceneContacts : public ContactFinder {
   void resume(std::span<const PosedBodies> posed) override { require(moved_.resume(scene_, posed), scene_); }
 
  private:
-  PairFilter filter_;
+  const PairFilter* filter_;
   std::vector<Motion> motion_;
   Scene scene_;
   MovedQuery moved_;
@@ -93,7 +92,7 @@ class SceneContacts : public ContactFinder {
 }  // namespace
 
 std::unique_ptr<ContactFinder> make_scene_contacts(std::span<const AssetView> assets, std::uint32_t threads,
-                                                   const PairFilter& filter) {
+                                                   const PairFilter* filter) {
   return std::make_unique<SceneContacts>(assets, threads, filter);
 }
 

@@ -33,7 +33,7 @@ Simulation::Simulation(std::vector<BodyProperties> bodies, std::vector<BodyState
       threads_(options.threads),
       joints_(std::move(parts_.joints)),
       joint_memory_(joints_.size()) {
-  for (const Joint& joint : joints_) joined_.push_back({joint.a, joint.b});
+  find_joined();
   follow_joints(0);
   if (parts_.solver == nullptr) parts_.solver = make_step_solver(options.solver);
   sleep_.start(bodies_.size());
@@ -77,6 +77,7 @@ void Simulation::find_contacts(StepRecord& record) {
   take(record, parts_.contacts->report());
   stopwatch.lap();
   if (parts_.ahead) parts_.ahead->add_to(found_, parts_.contacts->kept(), ahead);
+  drop_contacts_of_unmoved();
   cache_.update(found_, parts_.contacts->kept(), ahead);
   record.broad_phase += near_seconds;
   record.generation += stopwatch.lap();
@@ -86,6 +87,16 @@ void Simulation::find_contacts(StepRecord& record) {
     record.penetration_max = std::max(record.penetration_max, depth);
     record.penetration_mean += depth / static_cast<double>(record.contacts);
   }
+}
+
+// A fixed body that was placed is asked for contacts with all that does not move, of which only those with
+// sleeping bodies count.
+void Simulation::drop_contacts_of_unmoved() {
+  if (placed_.empty()) return;
+  std::erase_if(found_, [&](const ContactPoint& contact) {
+    return bodies_[contact.body_a].motion != Motion::moving &&
+           bodies_[contact.body_b].motion != Motion::moving;
+  });
 }
 
 // A step that misses contacts is solved again with them: what pushes a body may be found by no question that
@@ -99,10 +110,14 @@ void Simulation::solve(StepRecord& record) {
     states_ = before, joint_memory_ = joints_before;
     impulses = solve_contacts();
   }
-  if (parts_.continuous) parts_.continuous->limit(acting_, before, states_, options_.solver.slop);
+  if (parts_.continuous) parts_.continuous->limit(acting_, joined_, before, states_, options_.solver.slop);
   follow_joints(options_.dt);
+  break_joints();
   cache_.remember(impulses);
-  touches_.update(cache_.contacts(), impulses, idle());
+  std::vector<double> approach;
+  approach.reserve(cache_.contacts().size());
+  for (const ContactPoint& contact : cache_.contacts()) approach.push_back(approach_of(contact, before));
+  touches_.update(cache_.contacts(), done_, approach, idle());
   record.residual_max = parts_.solver->statistics().residual;
   record.residual_rms = parts_.solver->statistics().residual_rms;
   record.islands = parts_.solver->statistics().islands;
@@ -114,8 +129,9 @@ std::vector<ContactImpulse> Simulation::solve_contacts() {
   islands_ = find_islands(acting_, contacts, joined_);
   std::vector<ContactImpulse> impulses(contacts.size());
   if (options_.solver.warm_start) impulses = cache_.impulses();
+  done_.assign(contacts.size(), {});
   parts_.solver->step({acting_, contacts, islands_, options_.dt, pulls_, step_, cache_.is_cold(), threads_,
-                       joints_, joint_memory_},
+                       joints_, joint_memory_, done_},
                       states_, impulses);
   return impulses;
 }
@@ -137,10 +153,21 @@ bool Simulation::find_missed(std::span<const BodyState> before) {
 void Simulation::sleep() {
   if (!options_.sleep.enabled) return;
   std::vector<std::uint8_t> driven;
-  for (const Joint& joint : joints_) driven.push_back(joint.speed != 0 && joint.most_effort > 0);
+  for (const Joint& joint : joints_)
+    driven.push_back(joint.holds && joint.speed != 0 && joint.most_effort > 0);
   sleep_.wake_touched(acting_, cache_.contacts(), joined_);
+  wake_beside_placed();
   sleep_.fall_asleep(bodies_, states_, islands_, options_.sleep, options_.dt, driven);
   update_acting();
+}
+
+void Simulation::wake_beside_placed() {
+  if (placed_.empty()) return;
+  for (const ContactPoint& contact : cache_.contacts()) {
+    if (placed_[contact.body_a]) sleep_.wake(contact.body_b);
+    if (placed_[contact.body_b]) sleep_.wake(contact.body_a);
+  }
+  placed_.clear();
 }
 
 void Simulation::update_acting() {
@@ -151,7 +178,8 @@ void Simulation::update_acting() {
 
 std::vector<std::uint8_t> Simulation::idle() const {
   std::vector<std::uint8_t> idle(acting_.size());
-  for (std::size_t i = 0; i < idle.size(); ++i) idle[i] = acting_[i].motion == Motion::fixed ? 1 : 0;
+  for (std::size_t i = 0; i < idle.size(); ++i)
+    idle[i] = acting_[i].motion == Motion::fixed && (placed_.empty() || placed_[i] == 0) ? 1 : 0;
   return idle;
 }
 
@@ -183,8 +211,24 @@ void Simulation::take_measures(StepRecord& record) const {
 }
 
 void Simulation::place(std::uint32_t body, const BodyState& state) {
+  if (bodies_[body].motion == Motion::fixed) {
+    placed_.resize(bodies_.size());
+    placed_[body] = 1;
+  }
   states_[body] = state;
+  wake(body);
+}
+
+void Simulation::wake(std::uint32_t body) {
   sleep_.wake(body);
+  if (bodies_[body].motion != Motion::moving) {
+    const auto wake_other = [&](const ObjectPair& pair) {
+      const std::uint32_t other = pair.a == body ? pair.b : pair.a;
+      if ((pair.a == body || pair.b == body) && other != kNoIndex) sleep_.wake(other);
+    };
+    for (const WorldTouch& touch : touches_.touching()) wake_other({touch.a, touch.b});
+    std::ranges::for_each(joined_, wake_other);
+  }
   update_acting();
 }
 
@@ -192,8 +236,15 @@ void Simulation::set_force(std::uint32_t body, const BodyForce& force) {
   if (forces_.empty()) forces_.resize(bodies_.size());
   if (forces_[body] == force) return;
   forces_[body] = force;
-  sleep_.wake(body);
-  update_acting();
+  wake(body);
+}
+
+void Simulation::change(std::uint32_t body, const BodySettings& settings) {
+  BodySettings& of = bodies_[body];
+  if (of == settings) return;
+  of = settings;
+  static_cast<BodySettings&>(acting_[body]) = settings;
+  wake(body);
 }
 
 void Simulation::follow_joints(double time) {
@@ -205,10 +256,79 @@ void Simulation::follow_joints(double time) {
 
 void Simulation::set_motor(std::uint32_t joint, double speed, double most_effort) {
   joints_[joint].speed = speed, joints_[joint].most_effort = most_effort;
-  for (const std::uint32_t body : {joints_[joint].a, joints_[joint].b}) {
+  wake_joined(joints_[joint]);
+  update_acting();
+}
+
+std::uint32_t Simulation::add_joint(const Joint& joint) {
+  const auto free = std::ranges::find_if(joints_, &Joint::is_gone);
+  const auto place = static_cast<std::uint32_t>(free - joints_.begin());
+  // What may throw comes first.
+  if (!joint.may_touch) forget_contacts({std::min(joint.a, joint.b), std::max(joint.a, joint.b)});
+  const std::size_t count = std::max<std::size_t>(joints_.size(), place + 1);
+  joint_memory_.reserve(count), joined_.reserve(count), joints_.resize(count), joint_memory_.resize(count);
+  joints_[place] = joint;
+  joint_memory_[place] = {};
+  follow(joint, state_of(joint.a, states_), state_of(joint.b, states_), 0, joint_memory_[place]);
+  find_joined();
+  wake_joined(joint);
+  update_acting();
+  return place;
+}
+
+void Simulation::remove_joint(std::uint32_t joint) {
+  wake_joined(joints_[joint]);
+  joints_[joint] = {};
+  joints_[joint].a = joints_[joint].b = kNoIndex, joints_[joint].holds = false;
+  joint_memory_[joint] = {};
+  find_joined();
+  update_acting();
+}
+
+void Simulation::find_joined() {
+  joined_.clear();
+  for (const Joint& joint : joints_) joined_.push_back(joint.pair());
+}
+
+void Simulation::wake_joined(const Joint& joint) {
+  for (const std::uint32_t body : {joint.a, joint.b}) {
     if (body != kNoIndex) sleep_.wake(body);
   }
-  update_acting();
+}
+
+// The pair is asked for contacts when it is next near, as if it had never been.
+void Simulation::forget_contacts(const ObjectPair& pair) {
+  const auto entries = cache_.entries();
+  const auto posed = parts_.contacts->posed();
+  std::vector<CachedContact> others(entries.begin(), entries.end());
+  std::vector<PosedBodies> other_bodies(posed.begin(), posed.end());
+  std::erase_if(others, [&](const CachedContact& entry) { return entry.pair == pair; });
+  std::erase_if(other_bodies, [&](const PosedBodies& of) { return of.pair == pair; });
+  parts_.contacts->resume(other_bodies);
+  cache_.restore(std::move(others));
+}
+
+// A joint that does not hold does nothing from the step after it broke.
+void Simulation::break_joints() {
+  broken_.clear();
+  for (std::size_t i = 0; i < joints_.size(); ++i) {
+    if (!joints_[i].holds) joint_memory_[i].impulse = joint_memory_[i].done = {};
+  }
+  for (const std::uint32_t i : islands_.joints) {
+    const Joint& joint = joints_[i];
+    if (joint.breaking_force == INFINITY && joint.breaking_torque == INFINITY) continue;
+    const JointImpulse impulse =
+        impulse_of(joint, joint_memory_[i], state_of(joint.a, states_), state_of(joint.b, states_));
+    if (norm(impulse.linear) > options_.dt * joint.breaking_force ||
+        norm(impulse.turning) > options_.dt * joint.breaking_torque)
+      broken_.push_back(i);
+  }
+  std::ranges::sort(broken_);
+  for (const std::uint32_t i : broken_) {
+    joints_[i].holds = false;
+    wake_joined(joints_[i]);
+  }
+  find_joined();
 }
 
 SimulationState Simulation::save() const {
@@ -225,6 +345,8 @@ SimulationState Simulation::save() const {
           {quiet.begin(), quiet.end()},
           {groups.begin(), groups.end()},
           forces_,
+          {bodies_.begin(), bodies_.end()},
+          placed_,
           {touching.begin(), touching.end()},
           joints_,
           joint_memory_};
@@ -238,9 +360,16 @@ void Simulation::restore(SimulationState state) {
   if (parts_.ahead) parts_.ahead->restore(std::move(state.ahead));
   sleep_.restore(std::move(state.quiet), std::move(state.groups));
   forces_ = std::move(state.forces);
+  for (std::size_t i = 0; i < state.settings.size(); ++i) {
+    static_cast<BodySettings&>(bodies_[i]) = state.settings[i];
+    static_cast<BodySettings&>(acting_[i]) = state.settings[i];
+  }
+  placed_ = std::move(state.placed);
   touches_.restore(std::move(state.touching));
   joints_ = std::move(state.joints);
   joint_memory_ = std::move(state.joint_memory);
+  broken_.clear();
+  find_joined();
   update_acting();
 }
 

@@ -48,13 +48,15 @@ struct SimulationState {
   std::uint64_t step = 0;
   std::vector<BodyState> states;
   std::vector<CachedContact> contacts;
-  std::vector<PosedBodies> posed;     ///< of the contact finder
-  AheadState ahead;                   ///< empty: no contacts ahead are looked for
-  std::vector<double> quiet;          ///< of Sleep
-  std::vector<std::uint32_t> groups;  ///< of Sleep
-  std::vector<BodyForce> forces;      ///< empty: there are none
-  std::vector<ObjectPair> touching;   ///< of Touches
-  std::vector<Joint> joints;          ///< with what their motors ask for
+  std::vector<PosedBodies> posed;      ///< of the contact finder
+  AheadState ahead;                    ///< empty: no contacts ahead are looked for
+  std::vector<double> quiet;           ///< of Sleep
+  std::vector<std::uint32_t> groups;   ///< of Sleep
+  std::vector<BodyForce> forces;       ///< empty: there are none
+  std::vector<BodySettings> settings;  ///< of each body; empty: those that the bodies have
+  std::vector<std::uint8_t> placed;    ///< see Simulation::place(); empty: none was
+  std::vector<WorldTouch> touching;    ///< of Touches
+  std::vector<Joint> joints;           ///< with what their motors ask for
   std::vector<JointMemory> joint_memory;
 };
 
@@ -85,18 +87,24 @@ class Simulation {
   std::span<const BodyState> states() const { return states_; }
   std::vector<Instance> poses() const;
 
-  /// Puts a body somewhere else, awake.
+  /// Puts a body somewhere else, awake. One that contacts do not move wakes what touches it or is joined to
+  /// it, and in the next step what it touches then.
   void place(std::uint32_t body, const BodyState& state);
 
   /// Sets what acts on a body from the next step on, beside gravity and contacts. Wakes it if that is another
   /// force than before.
   void set_force(std::uint32_t body, const BodyForce& force);
 
+  /// Sets the numbers of a body from the next step on. If they are not what they were, the body wakes, or
+  /// where contacts do not move it, what touches it or is joined to it.
+  void change(std::uint32_t body, const BodySettings& settings);
+
   /// Sets how long the next steps are, in seconds.
   void set_step(double dt) { options_.dt = dt; }
 
-  /// The contacts of the last step, and their impulses.
-  const ContactCache& contacts() const { return cache_; }
+  /// Return the contacts of the last step, and what each of them did in it.
+  std::span<const ContactPoint> contacts() const { return cache_.contacts(); }
+  std::span<const ContactImpulse> impulses() const { return done_; }
 
   /// The pairs of bodies that touched in the last step.
   const Touches& touches() const { return touches_; }
@@ -108,6 +116,17 @@ class Simulation {
   /// Gives a joint's motor another target and greatest effort, and wakes what it joins.
   void set_motor(std::uint32_t joint, double speed, double most_effort);
 
+  /// Adds a joint in the first place from which one has been removed, else at the end, and wakes what it
+  /// joins. If these may not touch, what was remembered of their contacts is forgotten; that no others are
+  /// found is up to the filter. Returns the place.
+  std::uint32_t add_joint(const Joint& joint);
+
+  /// Removes a joint, and wakes what it joined. Others keep their places.
+  void remove_joint(std::uint32_t joint);
+
+  /// Returns the joints that broke in the last step, ascending. Such a joint keeps its place.
+  std::span<const std::uint32_t> broken() const { return broken_; }
+
   bool sleeps(std::uint32_t body) const { return sleep_.sleeps(body); }
 
   SimulationState save() const;
@@ -116,14 +135,21 @@ class Simulation {
   void restore(SimulationState state);
 
  private:
+  void wake(std::uint32_t body);
   void find_pulls();
   void find_contacts(StepRecord& record);
   void solve(StepRecord& record);
   std::vector<ContactImpulse> solve_contacts();
   bool find_missed(std::span<const BodyState> before);
+  void drop_contacts_of_unmoved();
   void sleep();
+  void wake_beside_placed();
   void update_acting();
+  void wake_joined(const Joint& joint);
+  void find_joined();
+  void forget_contacts(const ObjectPair& pair);
   void follow_joints(double time);
+  void break_joints();
   std::vector<std::uint8_t> idle() const;
   void take_measures(StepRecord& record) const;
 
@@ -135,12 +161,15 @@ class Simulation {
   std::vector<Joint> joints_;
   std::vector<ObjectPair> joined_;  // the bodies of each
   std::vector<JointMemory> joint_memory_;
+  std::vector<std::uint32_t> broken_;  // in the last step
   Islands islands_;
   std::vector<ContactPoint> found_;
   ContactCache cache_;
+  std::vector<ContactImpulse> done_;  // of its contacts, in the last step
   Touches touches_;
   Sleep sleep_;
-  std::vector<BodyForce> forces_;  // of each body; empty: none
+  std::vector<BodyForce> forces_;     // of each body; empty: none
+  std::vector<std::uint8_t> placed_;  // fixed bodies since the last step; empty: none was
   std::vector<Pull> pulls_;
   std::uint64_t step_ = 0;
 };

@@ -17,7 +17,7 @@ void SoftJoints::start(const StepInput& input, std::span<const std::uint32_t> is
                        std::span<const BodyState> states, std::span<const std::uint32_t> place,
                        std::span<const SteppedBody> bodies, double substeps, double unit) {
   input_ = &input;
-  scale_ = 1 / (substeps * unit);
+  scale_ = 1 / (substeps * unit), unit_ = unit;
   problem_ = {}, place_.assign(1, 0), at_start_.clear();
   problem_.states = states;
   for (const std::uint32_t island : islands) {
@@ -51,6 +51,7 @@ void SoftJoints::start(const StepInput& input, std::span<const std::uint32_t> is
     for (double* of_step : {&row.impulse, &row.least_push, &row.most_push}) *of_step *= scale_;
   }
   blocks_ = joint_blocks(problem_.joint_rows);
+  sum_.assign(problem_.joint_rows.size(), 0);
 }
 
 void SoftJoints::push(std::span<SoftMotion> velocities) {
@@ -81,8 +82,16 @@ void SoftJoints::visit(std::span<SoftMotion> velocities, double h, const Softnes
   write(velocities);
 }
 
+void SoftJoints::sum_up() {
+  for (std::size_t i = 0; i < sum_.size(); ++i) sum_[i] += problem_.joint_rows[i].impulse;
+}
+
 void SoftJoints::write(std::span<JointMemory> memory) const {
-  for (const JointRow& row : problem_.joint_rows) memory[row.joint].impulse[row.slot] = row.impulse / scale_;
+  for (std::size_t i = 0; i < sum_.size(); ++i) {
+    const JointRow& row = problem_.joint_rows[i];
+    memory[row.joint].impulse[row.slot] = row.impulse / scale_;
+    memory[row.joint].done[row.slot] = unit_ * sum_[i];
+  }
 }
 
 void SoftJoints::read(std::span<const SoftMotion> velocities) {

@@ -40,6 +40,9 @@ class SoftJoints {
   void follow(std::span<const SoftMotion> moved, double time);
   void add_due(std::span<SoftMotion> velocities);
 
+  /// Counts the impulses as those of a substep.
+  void sum_up();
+
   /// Visits all joints once. soft: see visit_joint().
   void visit(std::span<SoftMotion> velocities, double h, const Softness* soft);
 
@@ -56,7 +59,9 @@ class SoftJoints {
   std::vector<std::uint32_t> place_;     // of each of its bodies
   std::vector<Vector6> at_start_, due_;  // velocities, and what is to be added to them
   std::vector<JointBlock> blocks_;
-  double scale_ = 1;  // of an impulse of the step to one of a substep
+  std::vector<double> sum_;  // of each row's impulses in the substeps
+  double scale_ = 1;         // of an impulse of the step to one of a substep
+  double unit_ = 1;          // of masses
 };
 
 }  // namespace tandem::dynamics

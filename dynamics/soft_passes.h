@@ -251,6 +251,7 @@ class PairVisit {
           select(less(none, wanted), select(less(none, take(gap(i).strongest)), next - old, none), none);
       push(along, change);
       put(old + change, row.impulse, lane_);
+      put(take(friction(i).sum_of_normal) + change, friction(i).sum_of_normal, lane_);
     }
   }
 
@@ -375,6 +376,9 @@ class PairVisit {
     push(second, next2 - old2);
     put(next1, row.first_impulse, lane_);
     put(next2, row.second_impulse, lane_);
+    put(take(row.sum_of_normal) + push_of_normal, row.sum_of_normal, lane_);
+    put(take(row.sum_of_first) + next1, row.sum_of_first, lane_);
+    put(take(row.sum_of_second) + next2, row.sum_of_second, lane_);
   }
 
   // Makes what is longer than the bound as long as it.

@@ -51,6 +51,7 @@ struct SoftFriction {
   SoftDirection first, second;
   SoftNumber mass, coefficient;
   SoftNumber first_drive, second_drive, first_impulse, second_impulse;
+  SoftNumber sum_of_normal, sum_of_first, sum_of_second;  ///< of the impulses of all substeps
 };
 
 /// How each pair turns, and what resists that.

@@ -91,6 +91,7 @@ Residual SoftSolver::solve(const StepInput& input, std::span<const std::uint32_t
   joints_.start(input, islands, states, place_, bodies_, options.substeps, unit_root_ * unit_root_);
   run(step);
   write(step, states, impulses);
+  joints_.sum_up();
   joints_.write(input.joint_memory);
   return residual();
 }
@@ -317,7 +318,7 @@ void SoftSolver::run(const Step& step) {
   add_joints(Work::push_joints);
   for (std::uint32_t k = 0; k < step.options.substeps; ++k) {
     phases.push_back({k == 0 ? Work::begin : Work::accelerate});
-    add_joints(Work::visit_soft_joints);
+    add_joints(Work::visit_soft_joints, k * step.h);
     add_sweep(passes.push);
     phases.push_back({Work::move});
     add_joints(Work::follow_joints, (k + 1) * step.h);
@@ -372,6 +373,7 @@ void SoftSolver::work_on_joints(const Step& step, Work work, double time) {
   if (work == Work::push_joints) return joints_.push(velocities_);
   if (work == Work::follow_joints) return joints_.follow(moved_, time);
   if (work == Work::visit_joints) return joints_.visit(velocities_, step.h, nullptr);
+  if (time > 0) joints_.sum_up();  // of the substep before
   joints_.add_due(velocities_);
   joints_.visit(velocities_, step.h, &step.joints);
 }
@@ -395,11 +397,18 @@ void SoftSolver::write(const Step& step, std::span<BodyState> states,
     const Vector3 turning = {of(turns[0]), of(turns[1]), of(turns[2])};
     for (std::uint32_t i = 0; i < pair.contacts; ++i) {
       const std::uint32_t contact = contacts_[pair.first_contact + i], row = groups_[pair.group].first + i;
-      const auto [first, second] = Tangents(step.input.contacts[contact].normal);
-      impulses[contact] = {substeps * of(normals_[row].impulse),
-                           substeps * (of(frictions_[row].first_impulse) * first +
-                                       of(frictions_[row].second_impulse) * second),
-                           substeps / pair.contacts * turning};
+      const Tangents across(step.input.contacts[contact].normal);
+      const SoftFriction& friction = frictions_[row];
+      const auto impulse = [&](double scale, double normal, double along_first, double along_second) {
+        return ContactImpulse{scale * normal,
+                              scale * (along_first * across.first + along_second * across.second),
+                              substeps / pair.contacts * turning};
+      };
+      impulses[contact] = impulse(substeps, of(normals_[row].impulse), of(friction.first_impulse),
+                                  of(friction.second_impulse));
+      if (!step.input.done.empty())
+        step.input.done[contact] = impulse(unit_root_ * unit_root_, of(friction.sum_of_normal),
+                                           of(friction.sum_of_first), of(friction.sum_of_second));
     }
   });
 }

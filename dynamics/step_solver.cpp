@@ -69,7 +69,7 @@ class IslandSolver final : public StepSolver {
             std::span<ContactImpulse> impulses) override {
     place_.resize(input.bodies.size());
     std::vector<ObjectPair> joined;
-    for (const Joint& joint : input.joints) joined.push_back({joint.a, joint.b});
+    for (const Joint& joint : input.joints) joined.push_back(joint.pair());
     const std::vector<std::uint32_t> layers = find_layers(input.bodies, input.contacts, joined);
     const StepStart start = {states, impulses};
     std::vector<std::optional<Residual>> by_newton(input.islands.size());
@@ -100,6 +100,8 @@ class IslandSolver final : public StepSolver {
       else if (!input.islands.flies(i))
         soft.push_back(i);
     }
+    if (!input.done.empty()) std::ranges::copy(impulses, input.done.begin());
+    for (JointMemory& memory : input.joint_memory) memory.done = memory.impulse;
     all.add(soft_.solve(input, soft, options_, states, impulses));
     for (std::uint32_t i = 0; i < states.size(); ++i) {
       if (input.bodies[i].motion == Motion::kinematic)

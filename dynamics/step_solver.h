@@ -46,6 +46,9 @@ struct StepInput {
   Threads& threads;
   std::span<const Joint> joints = {};
   std::span<JointMemory> joint_memory = {};  ///< impulses of the step before, and then of this one
+  /// A result: what each contact did in the step, which in soft steps is not what the next step starts with;
+  /// empty: nobody asks.
+  std::span<ContactImpulse> done = {};
 
   /// Returns what is added to the velocity of any point of a body in a second, at most; 0 of a body that
   /// contacts do not move.

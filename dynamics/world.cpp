@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 #include <new>
 #include <optional>
 #include <stdexcept>
 #include <vector>
 
+#include "dynamics/lists_of_steps.h"
 #include "dynamics/scene_contacts.h"
 #include "dynamics/simulation.h"
 #include "tandem/kernels/excluded_pairs.h"
@@ -19,31 +19,39 @@ using namespace dynamics;
 class World::State {
  public:
   std::shared_ptr<const char> of;  // Parts::placed of the bodies whose state it is
-  double time;
+  double time, dt;
   SimulationState simulation;
 };
 
 struct World::Parts {
   std::vector<AssetView> assets;
   std::vector<std::uint32_t> group, mask;
-  ExcludedPairTable excluded;
+  std::vector<ObjectPair> excluded;  // by the caller
+  ExcludedPairTable apart;           // these, and those that joints keep from touching
+  PairFilter filter;                 // of the above; the simulation looks at it
   std::unique_ptr<Simulation> simulation;
   std::shared_ptr<const char> placed;  // of these bodies alone; null where there are none
   std::vector<BodyMotion> bodies;
   std::vector<WorldContact> contacts;
-  std::vector<ObjectPair> began, ended;  // in the last call
+  std::vector<WorldTouch> began;      // in the last call
+  std::vector<ObjectPair> ended;      // in the last call
+  std::vector<std::uint32_t> broken;  // joints, in the last call
   std::vector<WorldJoint> joints;
-  double time = 0;
+  double time = 0, dt = 1;  // dt: of the last step
   std::uint64_t where = 0;
 
   void clear() {
     simulation.reset(), placed.reset();
-    bodies.clear(), contacts.clear(), began.clear(), ended.clear(), joints.clear();
-    time = 0, where = 0;
+    bodies.clear(), contacts.clear(), joints.clear();
+    forget_call();
+    time = 0, dt = 1, where = 0;
   }
+  void forget_call() { began.clear(), ended.clear(), broken.clear(); }
+  void take_changes();
+  Status filter_pairs(std::span<const Joint> joints);
   void read();
   void read_contacts();
-  void read_joints(double dt);
+  void read_joints();
 };
 
 namespace {
@@ -70,17 +78,10 @@ Status check(const WorldOptions& options) {
   return good ? Status::kOk : Status::kBadOption;
 }
 
-bool is_usable_start(const BodyDescription& body, const BodyState& state) {
+bool is_usable(const BodySettings& body) {
   const Material& material = body.material;
-  return is_usable(state) && is_option(body.gravity_scale, -kMost, kMost) && material.friction <= kMost &&
+  return is_option(body.gravity_scale, -kMost, kMost) && material.friction <= kMost &&
          material.restitution <= 1 && material.rolling_resistance <= kMost;
-}
-
-// Adds pairs to others; both are ascending.
-void add(std::span<const ObjectPair> pairs, std::vector<ObjectPair>& to) {
-  std::vector<ObjectPair> all;
-  std::ranges::set_union(to, pairs, std::back_inserter(all));
-  to.swap(all);
 }
 
 // Masses of assets, found once.
@@ -116,6 +117,21 @@ class Masses {
   std::span<const AssetView> assets_;
   std::vector<std::optional<BodyProperties>> of_;
 };
+
+SimulationOptions simulation_options(const WorldOptions& options, std::span<const AssetView> assets,
+                                     std::span<const BodyProperties> bodies) {
+  SimulationOptions to;
+  to.gravity = vector_of(options.gravity);
+  to.solver.friction = options.friction, to.solver.restitution = options.restitution;
+  to.solver.slop = options.slop >= 0 ? options.slop : default_slop(assets, bodies);
+  to.solver.rolling_resistance =
+      options.rolling_resistance >= 0 ? options.rolling_resistance : 16 * to.solver.slop;
+  to.solver.substeps = options.substeps;
+  to.sleep.enabled = options.sleeping;
+  to.sleep.speed = kSleepSpeed;
+  to.threads = options.threads;
+  return to;
+}
 
 Status check(const JointDescription& joint, std::span<const BodyProperties> bodies) {
   bool moves = false;
@@ -178,42 +194,30 @@ Status World::set_bodies(std::span<const BodyDescription> bodies, const WorldOpt
         states[i].velocity = vector_of(from.velocity);
         states[i].angular_velocity = vector_of(from.angular_velocity);
       }
-      if (!is_usable_start(from, states[i])) return fail(Status::kOutOfRange, i);
+      if (!is_usable(all[i]) || !is_usable(states[i])) return fail(Status::kOutOfRange, i);
       parts.group.push_back(from.filter.group), parts.mask.push_back(from.filter.mask);
     }
-    std::vector<ObjectPair> apart(excluded.begin(), excluded.end());
     std::vector<Joint> joined;
     for (std::size_t i = 0; i < joints.size(); ++i) {
       const JointDescription& from = joints[i];
       const Status status = check(from, all);
       if (status != Status::kOk) return fail(status, i);
       joined.push_back(make_joint(from, states));
-      if (!from.may_touch && from.a != kNoIndex && from.b != kNoIndex) apart.push_back({from.a, from.b});
     }
-    const Status excludes = parts.excluded.set(apart);
-    if (excludes != Status::kOk) return fail(excludes);
-    const PairFilter filter = {nullptr, parts.group.data(), parts.mask.data(), parts.excluded.view()};
-    SimulationOptions to;
-    to.gravity = vector_of(options.gravity);
-    to.solver.friction = options.friction, to.solver.restitution = options.restitution;
-    to.solver.slop = options.slop >= 0 ? options.slop : default_slop(parts.assets, all);
-    to.solver.rolling_resistance =
-        options.rolling_resistance >= 0 ? options.rolling_resistance : 16 * to.solver.slop;
-    to.solver.substeps = options.substeps;
-    to.sleep.enabled = options.sleeping;
-    to.sleep.speed = kSleepSpeed;
-    to.threads = options.threads;
+    parts.excluded.assign(excluded.begin(), excluded.end());
+    const Status filters = parts.filter_pairs(joined);
+    if (filters != Status::kOk) return fail(filters);
+    const SimulationOptions to = simulation_options(options, parts.assets, all);
     SimulationParts of;
-    of.contacts = make_scene_contacts(parts.assets, options.threads, filter);
-    of.ahead = std::make_unique<ContactsAhead>(parts.assets, options.threads, filter);
+    of.contacts = make_scene_contacts(parts.assets, options.threads, &parts.filter);
+    of.ahead = std::make_unique<ContactsAhead>(parts.assets, options.threads, &parts.filter);
     if (options.continuous)
-      of.continuous = std::make_unique<ContinuousMotion>(parts.assets, options.threads, filter);
+      of.continuous = std::make_unique<ContinuousMotion>(parts.assets, options.threads, &parts.filter);
     of.joints = std::move(joined);
     parts.simulation = std::make_unique<Simulation>(std::move(all), std::move(states), std::move(of), to);
     parts.placed = std::make_shared<char>();
-    parts.joints.resize(joints.size());
     parts.read();
-    parts.read_joints(1);
+    parts.read_joints();
   } catch (const std::bad_alloc&) {
     parts.clear();
     return fail(Status::kOutOfMemory);
@@ -237,11 +241,34 @@ void World::Parts::read() {
   }
 }
 
+// Lets the simulation look past pairs that are excluded, or joined and may not touch.
+Status World::Parts::filter_pairs(std::span<const Joint> joined) {
+  std::vector<ObjectPair> pairs = excluded;
+  for (const Joint& joint : joined) {
+    if (joint.holds && !joint.may_touch && joint.a != kNoIndex && joint.b != kNoIndex)
+      pairs.push_back(joint.pair());
+  }
+  ExcludedPairTable table;
+  const Status status = table.set(pairs);
+  if (status != Status::kOk) return status;
+  apart = std::move(table);
+  filter = {nullptr, group.data(), mask.data(), apart.view()};
+  return Status::kOk;
+}
+
+// Adds what a step changed to the lists of the call.
+void World::Parts::take_changes() {
+  const Touches& touches = simulation->touches();
+  add_touches(touches.began(), touches.touching(), began);
+  add_pairs(touches.ended(), ended);
+  broken.insert(broken.end(), simulation->broken().begin(), simulation->broken().end());
+  std::ranges::sort(broken);
+}
+
 void World::Parts::read_contacts() {
-  const std::vector<ContactImpulse> impulses = simulation->contacts().impulses();
   contacts.clear();
-  for (const ContactPoint& point : simulation->contacts().contacts()) {
-    const ContactImpulse& impulse = impulses[contacts.size()];
+  for (const ContactPoint& point : simulation->contacts()) {
+    const ContactImpulse& impulse = simulation->impulses()[contacts.size()];
     WorldContact& contact = contacts.emplace_back();
     contact.a = point.body_a, contact.b = point.body_b;
     contact.depth = point.depth;
@@ -251,26 +278,19 @@ void World::Parts::read_contacts() {
   }
 }
 
-void World::Parts::read_joints(double dt) {
+void World::Parts::read_joints() {
+  joints.assign(simulation->joints().size(), WorldJoint{});
   for (std::size_t i = 0; i < joints.size(); ++i) {
     const Joint& joint = simulation->joints()[i];
+    if (joint.is_gone()) continue;
     const JointMemory& memory = simulation->joint_memory()[i];
     const auto states = simulation->states();
     const BodyState a = state_of(joint.a, states), b = state_of(joint.b, states);
-    const JointGeometry geometry = geometry_of(joint, a, b, memory.position);
-    const JointDirections directions = directions_of(joint, geometry);
-    Vector3 impulse, turning;
-    double effort = 0;
-    for (std::size_t k = 0; k < directions.count; ++k) {
-      const JointDirection& row = directions.row[k];
-      const double push = memory.impulse[row.slot];
-      impulse += push * row.linear;
-      turning += push * (row.angular_b - cross(geometry.arm_b, row.linear));
-      if (row.kind == JointRowKind::motor) effort = push / dt;
-    }
-    joints[i] = {memory.position, free_speed(joint, geometry, a, b), {}, {}, effort};
-    write(impulse, joints[i].impulse);
-    write(turning, joints[i].turning);
+    const JointImpulse impulse = impulse_of(joint, memory, a, b);
+    const double speed = free_speed(joint, geometry_of(joint, a, b, memory.position), a, b);
+    joints[i] = {memory.position, speed, {}, {}, impulse.motor / dt, joint.holds};
+    write(impulse.linear, joints[i].impulse);
+    write(impulse.turning, joints[i].turning);
   }
 }
 
@@ -283,8 +303,9 @@ Status World::step(double dt, std::uint32_t steps) {
   Status status = Status::kOk;
   std::uint64_t blamed = 0;
   try {
-    parts.began.clear(), parts.ended.clear();
+    parts.forget_call();
     simulation.set_step(dt);
+    if (steps > 0) parts.dt = dt;
     for (std::uint32_t i = 0; i < steps && status == Status::kOk; ++i) {
       SimulationState before = simulation.save();
       try {
@@ -295,20 +316,21 @@ Status World::step(double dt, std::uint32_t steps) {
         status = Status::kOutOfMemory;
       }
       const auto states = simulation.states();
-      const auto lost = std::ranges::find_if_not(states, is_usable);
+      const auto lost = std::ranges::find_if_not(states, [](const BodyState& of) { return is_usable(of); });
       if (status == Status::kOk && lost != states.end())
         status = Status::kOutOfRange, blamed = static_cast<std::uint64_t>(lost - states.begin());
+      if (status == Status::kOk && !simulation.broken().empty())
+        status = parts.filter_pairs(simulation.joints());
       if (status != Status::kOk) {
         simulation.restore(std::move(before));
         continue;
       }
       parts.time += dt;
-      add(simulation.touches().began(), parts.began);
-      add(simulation.touches().ended(), parts.ended);
+      parts.take_changes();
     }
     parts.read();
     parts.read_contacts();
-    parts.read_joints(dt);
+    parts.read_joints();
   } catch (const std::bad_alloc&) {
     return fail(Status::kOutOfMemory);
   } catch (const QueryFailed& failed) {
@@ -326,13 +348,13 @@ std::span<const WorldContact> World::contacts() const {
                            : std::span<const WorldContact>();
 }
 
-std::span<const ObjectPair> World::touching() const {
+std::span<const WorldTouch> World::touching() const {
   return parts_ != nullptr && parts_->simulation != nullptr ? parts_->simulation->touches().touching()
-                                                            : std::span<const ObjectPair>();
+                                                            : std::span<const WorldTouch>();
 }
 
-std::span<const ObjectPair> World::began() const {
-  return parts_ != nullptr ? std::span<const ObjectPair>(parts_->began) : std::span<const ObjectPair>();
+std::span<const WorldTouch> World::began() const {
+  return parts_ != nullptr ? std::span<const WorldTouch>(parts_->began) : std::span<const WorldTouch>();
 }
 
 std::span<const ObjectPair> World::ended() const {
@@ -343,8 +365,53 @@ std::span<const WorldJoint> World::joints() const {
   return parts_ != nullptr ? std::span<const WorldJoint>(parts_->joints) : std::span<const WorldJoint>();
 }
 
+std::span<const std::uint32_t> World::broken() const {
+  return parts_ != nullptr ? std::span<const std::uint32_t>(parts_->broken)
+                           : std::span<const std::uint32_t>();
+}
+
+Status World::add_joint(const JointDescription& description, std::uint32_t& joint) {
+  if (bodies().empty()) return fail(Status::kUnknownInstance);
+  Simulation& simulation = *parts_->simulation;
+  const Status status = check(description, simulation.bodies());
+  if (status != Status::kOk) return fail(status);
+  try {
+    const std::uint32_t place = simulation.add_joint(make_joint(description, simulation.states()));
+    const Status filters = parts_->filter_pairs(simulation.joints());
+    if (filters != Status::kOk) {
+      simulation.remove_joint(place);
+      return fail(filters);
+    }
+    joint = place;
+    parts_->read();
+    parts_->read_joints();
+  } catch (const std::bad_alloc&) {
+    return fail(Status::kOutOfMemory);
+  } catch (const QueryFailed& failed) {
+    return fail(failed.status, failed.where);
+  }
+  return fail(Status::kOk);
+}
+
+Status World::remove_joint(std::uint32_t joint) {
+  if (joint >= joints().size() || parts_->simulation->joints()[joint].is_gone())
+    return fail(Status::kBadJoint, joint);
+  try {
+    std::vector<Joint> left(parts_->simulation->joints().begin(), parts_->simulation->joints().end());
+    left[joint].holds = false;
+    const Status filters = parts_->filter_pairs(left);
+    if (filters != Status::kOk) return fail(filters);
+    parts_->simulation->remove_joint(joint);
+    parts_->read();
+    parts_->read_joints();
+  } catch (const std::bad_alloc&) {
+    return fail(Status::kOutOfMemory);
+  }
+  return fail(Status::kOk);
+}
+
 Status World::set_motor(std::uint32_t joint, double speed, double most_effort) {
-  if (joint >= joints().size()) return fail(Status::kBadJoint, joint);
+  if (joint >= joints().size() || !joints()[joint].holds) return fail(Status::kBadJoint, joint);
   JointDescription motor;
   motor.kind = parts_->simulation->joints()[joint].kind;
   motor.speed = speed, motor.most_effort = most_effort;
@@ -372,9 +439,35 @@ Status World::set(std::uint32_t body, const BodyMotion& motion) {
   state.velocity = vector_of(motion.velocity);
   state.angular_velocity = vector_of(motion.angular_velocity);
   if (!is_usable(state)) return fail(Status::kOutOfRange, body);
-  parts_->simulation->place(body, state);
+  if (parts_->simulation->bodies()[body].motion == Motion::fixed)
+    state.velocity = state.angular_velocity = Vector3{};
+  try {
+    parts_->simulation->place(body, state);
+  } catch (const std::bad_alloc&) {
+    return fail(Status::kOutOfMemory);
+  }
   parts_->read();
   return fail(Status::kOk);
+}
+
+// change(settings): makes them what they are to be.
+template <typename Change>
+Status World::change(std::uint32_t body, const Change& change) {
+  if (body >= bodies().size()) return fail(Status::kUnknownInstance, body);
+  BodySettings settings = parts_->simulation->bodies()[body];
+  change(settings);
+  if (!is_usable(settings)) return fail(Status::kOutOfRange, body);
+  parts_->simulation->change(body, settings);
+  parts_->read();
+  return fail(Status::kOk);
+}
+
+Status World::set_material(std::uint32_t body, const Material& material) {
+  return change(body, [&](BodySettings& settings) { settings.material = material; });
+}
+
+Status World::set_gravity_scale(std::uint32_t body, double gravity_scale) {
+  return change(body, [&](BodySettings& settings) { settings.gravity_scale = gravity_scale; });
 }
 
 Status World::push(std::uint32_t body, const double (&impulse)[3], const double (&at)[3]) {
@@ -411,7 +504,7 @@ Status World::save(std::shared_ptr<const State>& state) const {
   try {
     auto kept = std::make_shared<State>();
     kept->of = parts_->placed;
-    kept->time = parts_->time;
+    kept->time = parts_->time, kept->dt = parts_->dt;
     if (parts_->simulation != nullptr) kept->simulation = parts_->simulation->save();
     state = std::move(kept);
   } catch (const std::bad_alloc&) {
@@ -426,10 +519,12 @@ Status World::restore(const State& state) {
   if (state.of == nullptr) return fail(Status::kOk);
   try {
     parts_->simulation->restore(state.simulation);
-    parts_->time = state.time;
-    parts_->contacts.clear(), parts_->began.clear(), parts_->ended.clear();
+    const Status filters = parts_->filter_pairs(parts_->simulation->joints());
+    if (filters != Status::kOk) return fail(filters);
+    parts_->time = state.time, parts_->dt = state.dt;
+    parts_->contacts.clear(), parts_->forget_call();
     parts_->read();
-    parts_->read_joints(1);
+    parts_->read_joints();
   } catch (const std::bad_alloc&) {
     return fail(Status::kOutOfMemory);
   } catch (const QueryFailed& failed) {

@@ -165,8 +165,11 @@ TEST(World, AForceLastsUntilItIsChanged) {
 
 using Pairs = std::vector<ObjectPair>;
 
-Pairs copied(std::span<const ObjectPair> pairs) {
-  return {pairs.begin(), pairs.end()};
+template <typename Row>
+Pairs copied(std::span<const Row> rows) {
+  Pairs pairs;
+  for (const Row& row : rows) pairs.push_back({row.a, row.b});
+  return pairs;
 }
 
 TEST(World, ABallThatBouncesTwiceBeginsAndEndsToTouchInTheStepsOfTheClosedForm) {
@@ -205,6 +208,57 @@ TEST(World, ABallThatBouncesTwiceBeginsAndEndsToTouchInTheStepsOfTheClosedForm) 
   }
 }
 
+// One ball is an island that Newton's method solves, four layers of boxes are not.
+TEST(World, WhatTouchesTellsHowHardAsMomentumSays) {
+  WorldOnGround ball(sphere(0.5, 3));
+  constexpr double kDrop = 1.3, kRestitution = 0.6;
+  ball.add(shift(0.3, 0.2, 0.5 + kDrop)).material.restitution = kRestitution;
+  World& world = ball.begin();
+  double before = 0, hardest = 0, fastest = 0;
+  for (int i = 0; i < 100; ++i) {
+    ASSERT_EQ(world.step(kStep), Status::kOk);
+    const double now = world.bodies()[1].velocity[2],
+                 needed = world.mass_of(1) * (now - before + kGravity * kStep);
+    EXPECT_EQ(world.touching().empty(), world.contacts().empty());
+    if (!world.touching().empty()) {
+      EXPECT_NEAR(world.touching()[0].impulse, needed, 1e-3 * needed + 1e-9);
+      EXPECT_NEAR(std::hypot(world.touching()[0].position[0] - 0.3, world.touching()[0].position[1] - 0.2), 0,
+                  0.03);
+      EXPECT_NEAR(world.touching()[0].position[2], 0, 0.5 * 5.1 * kStep);  // half-way to where it will be
+      hardest = std::max(hardest, world.touching()[0].impulse);
+    }
+    if (!world.began().empty()) {
+      EXPECT_EQ(world.began()[0].impulse, world.touching()[0].impulse);
+      EXPECT_EQ(world.began()[0].speed, -before);
+      fastest = std::max(fastest, -before);
+    }
+    before = now;
+  }
+  const double speed = std::sqrt(2 * kGravity * kDrop);
+  EXPECT_NEAR(hardest / (world.mass_of(1) * (1 + kRestitution) * speed), 1, 0.05);
+  ASSERT_EQ(ball.begin().step(kStep, 100), Status::kOk);
+  EXPECT_EQ(world.began()[0].impulse, hardest);  // of all bounces of the call
+  EXPECT_EQ(world.began()[0].speed, fastest);
+  EXPECT_NEAR(fastest, speed, kGravity * kStep);
+
+  WorldOnGround heap(box(1, 1, 1));
+  for (int i = 0; i < 100; ++i) heap.add(shift(i % 5, i / 5 % 5, 0.8 + i / 25)).velocity[2] = -3;
+  World& falls = heap.begin();
+  before = -3 * 100;
+  for (int i = 0; i < 20; ++i) {
+    ASSERT_EQ(falls.step(kStep), Status::kOk);
+    double now = 0, told = 0, by_contacts = 0;
+    for (const BodyMotion& body : falls.bodies()) now += body.velocity[2];
+    const double needed = falls.mass_of(1) * (now - before + 100 * kGravity * kStep);
+    for (const WorldTouch& touch : falls.touching()) told += touch.a == 0 ? touch.impulse : 0;
+    for (const WorldContact& contact : falls.contacts())
+      by_contacts += contact.a == 0 ? contact.impulse[2] : 0;
+    EXPECT_NEAR(told, needed, 1e-4 * needed + 1);
+    EXPECT_NEAR(by_contacts, needed, 1e-4 * needed + 1);
+    before = now;
+  }
+}
+
 TEST(World, BodiesThatSleepOnEachOtherGoOnTouching) {
   WorldOnGround scene(box(1, 1, 1));
   scene.add(shift(0, 0, 0.5));
@@ -234,6 +288,76 @@ TEST(World, BodiesThatSleepOnEachOtherGoOnTouching) {
     EXPECT_TRUE(world.ended().empty());
     EXPECT_EQ(copied(world.touching()), all);
   }
+}
+
+TEST(World, AFixedOrKinematicBodyThatIsSetWakesWhatRestsOnItAndWhatItMeets) {
+  for (const Motion motion : {Motion::fixed, Motion::kinematic}) {
+    WorldOnGround scene(box(1, 1, 1));
+    scene.add(shift(0, 0, 0.5)).filter.motion = motion;
+    scene.add(shift(0.2, 0, 1.5));
+    scene.add(shift(0.2, 0, 2.5));
+    scene.add(shift(6, 0, 0.5));
+    World& world = scene.begin();
+    const auto sleeps = [&](std::uint32_t body) { return world.bodies()[body].sleeps; };
+    ASSERT_EQ(world.step(kStep, 60), Status::kOk);
+    if (motion == Motion::fixed) {
+      ASSERT_TRUE(sleeps(2) && sleeps(3));
+    }
+    ASSERT_TRUE(sleeps(4));
+    // It is put into the box that stands by itself, and those on it fall.
+    BodyMotion there = world.bodies()[1];
+    there.pose.translation[0] = 5.01, there.velocity[0] = motion == Motion::fixed ? 1 : 0;
+    std::shared_ptr<const World::State> state;
+    ASSERT_EQ(world.set(1, there), Status::kOk);
+    EXPECT_EQ(world.bodies()[1].velocity[0], 0);
+    EXPECT_FALSE(sleeps(2) || sleeps(3));
+    EXPECT_TRUE(sleeps(4));
+    ASSERT_EQ(world.save(state), Status::kOk);
+    for (const bool again : {false, true}) {
+      ASSERT_EQ(world.step(kStep), Status::kOk);
+      EXPECT_FALSE(sleeps(4)) << again;  // by contact, so a step later
+      if (!again) {
+        ASSERT_EQ(world.restore(*state), Status::kOk);
+      }
+    }
+    ASSERT_EQ(world.step(kStep, 60), Status::kOk);
+    EXPECT_NEAR(world.bodies()[2].centre[2], 0.5, 1e-3);
+    EXPECT_GT(world.bodies()[4].centre[0], 6.009);  // out of it, but for the slop
+    for (const WorldTouch& pair : world.touching())
+      EXPECT_FALSE(pair.a == 0 && pair.b == 1 && motion == Motion::fixed);
+  }
+}
+
+TEST(World, MaterialsAndGravityMayChangeAndWake) {
+  const double slope = std::atan(0.3);
+  WorldOnGround scene(box(1, 1, 0.5f));
+  scene.add(shift(0, 0, 0.25));
+  World& world = scene.begin({.gravity = {kGravity * std::sin(slope), 0, -kGravity * std::cos(slope)}});
+  ASSERT_EQ(world.step(kStep, 60), Status::kOk);
+  ASSERT_TRUE(world.bodies()[1].sleeps);
+  std::shared_ptr<const World::State> state;
+  ASSERT_EQ(world.save(state), Status::kOk);
+  ASSERT_EQ(world.set_material(1, {}), Status::kOk);
+  EXPECT_TRUE(world.bodies()[1].sleeps);  // it is what it was
+  for (const std::uint32_t body : {1, 0}) {
+    // Of the block, or of the ground, which is fixed: the mean with 0.5 is 0.2.
+    ASSERT_EQ(world.set_material(body, {.friction = 0.08}), Status::kOk);
+    EXPECT_FALSE(world.bodies()[1].sleeps);
+    ASSERT_EQ(world.step(kStep, 60), Status::kOk);
+    const double gained = kGravity * (std::sin(slope) - 0.2 * std::cos(slope));
+    EXPECT_NEAR(world.bodies()[1].velocity[0], gained, 0.02 * gained);
+    ASSERT_EQ(world.restore(*state), Status::kOk);
+    ASSERT_EQ(world.step(kStep, 60), Status::kOk);
+    EXPECT_TRUE(world.bodies()[1].sleeps) << body;  // which has its friction again
+  }
+  ASSERT_EQ(world.set_gravity_scale(1, -0.5), Status::kOk);
+  ASSERT_EQ(world.step(kStep, 60), Status::kOk);
+  EXPECT_NEAR(world.bodies()[1].velocity[2], 0.5 * kGravity * std::cos(slope), 1e-9);
+  ASSERT_EQ(world.restore(*state), Status::kOk);
+  EXPECT_TRUE(world.bodies()[1].sleeps);
+  EXPECT_EQ(world.set_gravity_scale(2, 1), Status::kUnknownInstance);
+  EXPECT_EQ(world.set_gravity_scale(1, kNan), Status::kOutOfRange);
+  EXPECT_EQ(world.set_material(1, {.restitution = 1.5}), Status::kOutOfRange);
 }
 
 TEST(World, ARodThatSpinsFastKeepsItsEnergy) {

@@ -85,8 +85,13 @@ def simulate(assets: list[tandem.Asset]) -> None:
                          angular_velocity=[0, 0, 1], gravity=(0, 0, -1), friction=0.1, restitution=0.5, slop=None, rolling_resistance=0.0, substeps=4,
                          sleeping=True, continuous=True, threads=2)
     world.set_force(1, [0, 0, 5], torque=np.zeros(3))
-    pairs: list[tuple[int, int]] = world.touching.tolist() + world.began.tolist() + world.ended.tolist()
-    assert not pairs
+    pairs: list[tuple[int, int]] = world.touching[["a", "b"]].tolist() + world.began[["a", "b"]].tolist() + world.ended.tolist()
+    broken: list[int] = world.broken.tolist()
+    assert not pairs and not broken
+    joint: int = world.add_joint(tandem.Joint("ball", None, 1, anchor=(0.0, 0.0, 2.0), breaking_force=1e3, breaking_torque=None))
+    world.remove_joint(joint)
+    world.set_material(1, friction=0.2, rolling_resistance=None)
+    world.set_gravity_scale(1, 0.5)
     state: tandem.WorldState = world.save()
     world.step(1 / 60, steps=10)
     world.push(1, [0, 0, 1], at=np.zeros(3))

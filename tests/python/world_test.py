@@ -148,18 +148,27 @@ def test_forces_last_and_are_kept():
     assert np.allclose(world.angular_velocity, [[0, 0, 1]])
 
 
+def pairs_of(touches):
+    return touches[["a", "b"]].tolist()
+
+
 def test_what_touches_is_told():
     world, ones = pair(1.3, restitution=[0, 0.8], sleeping=False), pair(1.3, restitution=[0, 0.8], sleeping=False)
     kept = world.save()
-    began, ended = [], []
+    began, ended, hardest = [], [], []
     for _ in range(60):
         ones.step(1 / 60)
-        began += ones.began.tolist()
+        began += pairs_of(ones.began)
+        hardest += ones.touching["impulse"].tolist()
         ended += ones.ended.tolist()
     assert began.count((0, 1)) >= 2 and ended.count((0, 1)) >= 1
     world.step(1 / 60, 60)
-    assert world.touching.dtype == tandem.PAIR and world.began.tolist() == world.ended.tolist() == [(0, 1)]
+    assert world.touching.dtype == world.began.dtype == tandem.WORLD_TOUCH and world.ended.dtype == tandem.PAIR
+    assert pairs_of(world.began) == world.ended.tolist() == [(0, 1)]
     assert world.touching.tolist() == ones.touching.tolist()
+    assert world.began["impulse"][0] == max(hardest) == pytest.approx(1000 * 1.8 * (2 * 9.81 * 0.3) ** 0.5, rel=0.05)
+    assert world.began["speed"][0] == pytest.approx((2 * 9.81 * 0.3) ** 0.5, abs=9.81 / 60)
+    assert np.allclose(world.began["position"], [0.1, 0.05, 0.5], atol=0.5)
     world.step(1 / 60, 0)
     assert len(world.began) == len(world.ended) == 0
     world.step(1 / 60, 60)
@@ -184,6 +193,63 @@ def test_joints_hold_and_motors_turn():
         world.place(translation=[0, 0, 0], joints=[tandem.Joint("slider", 0, None, anchor=[0, 0, 0], axis=[0, 0, 0])])
     with pytest.raises(ValueError, match="kind is 'rope'"):
         world.place(translation=[0, 0, 0], joints=[tandem.Joint("rope", 0, None, anchor=[0, 0, 0])])
+
+
+def test_joints_come_go_and_break():
+    world = tandem.World([BOX], translation=[[0, 0, 0], [0, 0, 1]], filter=FIRST_FIXED)
+    world.step(1 / 60, 60)
+    assert world.sleeping[1] and len(world.joints) == 0
+    weight = 9.81 * world.mass[1]
+    kept = world.save()
+    assert world.add_joint(tandem.Joint("fixed", 0, 1, anchor=[0, 0, 0.5], breaking_force=2 * weight)) == 0
+    assert world.joints["holds"].tolist() == [1] and not world.sleeping[1]
+    world.set_force(1, [0, 0, 2.9 * weight])
+    world.step(1 / 60, 30)
+    assert len(world.touching) == len(world.broken) == 0 and (abs(world.velocity) < 1e-6).all()
+    world.set_force(1, [0, 0, 3.1 * weight])
+    world.step(1 / 60, 61)
+    assert world.broken.tolist() == [0] and world.joints["holds"].tolist() == [0]
+    assert world.velocity[1, 2] == pytest.approx(2.1 * 9.81)
+    world.step(1 / 60)
+    assert len(world.broken) == 0
+    world.remove_joint(0)
+    with pytest.raises(tandem.Error, match="no such joint"):
+        world.remove_joint(0)
+    with pytest.raises(tandem.Error, match="nothing"):
+        world.add_joint(tandem.Joint("ball", 0, None, anchor=[0, 0, 0]))
+    with pytest.raises(ValueError, match="breaking_torque is 0"):
+        world.add_joint(tandem.Joint("ball", 1, None, anchor=[0, 0, 0], breaking_torque=0))
+    world.restore(kept)
+    assert len(world.joints) == 0 and world.sleeping[1]
+
+
+def test_materials_and_gravity_change():
+    world = pair(friction=0.5, gravity=[0.3 * 9.81, 0, -9.81])
+    world.step(1 / 60, 60)
+    kept = world.save()
+    for body in (0, 1):
+        assert world.sleeping[1]
+        world.set_material(body, friction=0.02)
+        world.step(1 / 60, 30)
+        assert world.velocity[1, 0] == pytest.approx(0.5 * (0.3 - 0.1) * 9.81, rel=0.02)
+        world.restore(kept)
+    world.set_gravity_scale(1, -1)
+    world.step(1 / 60, 30)
+    assert world.velocity[1, 2] == pytest.approx(0.5 * 9.81)
+    world.restore(kept)
+    world.set_material(1, friction=0.1)
+    world.set_material(1)
+    world.step(1 / 60, 60)
+    assert world.sleeping[1]
+
+
+def test_a_fixed_body_that_moves_wakes_what_lies_on_it():
+    world = pair()
+    world.step(1 / 60, 60)
+    world.move(0, translation=[0, 0, -1], velocity=[1, 0, 0])
+    assert not world.sleeping[1] and (world.velocity[0] == 0).all()
+    world.step(1 / 60, 60)
+    assert world.translation[1, 2] == pytest.approx(0, abs=1e-3)
 
 
 def test_filters_and_no_bodies():
@@ -264,6 +330,11 @@ def test_a_restored_world_goes_on_alike():
     (lambda w: w.set_force(2, np.zeros(3)), ValueError, "body is 2 where 0 to 1"),
     (lambda w: w.set_force(1, [1, 2]), ValueError, "force has shape"),
     (lambda w: w.set_force(1, torque=[0, 0, np.inf]), tandem.Error, "not finite"),
+    (lambda w: w.set_material(2, friction=1), ValueError, "body is 2 where 0 to 1"),
+    (lambda w: w.set_material(1, restitution=1.1), ValueError, "restitution is 1.1 where at most 1"),
+    (lambda w: w.set_material(1, friction=np.nan), ValueError, "friction is nan"),
+    (lambda w: w.set_gravity_scale(1, np.nan), tandem.Error, "not finite"),
+    (lambda w: w.remove_joint(0), tandem.Error, "no such joint"),
     (lambda w: w.step(0), ValueError, "dt is 0"),
     (lambda w: w.step(-1 / 60), ValueError, "dt is -0.01"),
     (lambda w: w.step(np.nan), ValueError, "dt is nan"),

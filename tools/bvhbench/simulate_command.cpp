@@ -243,14 +243,14 @@ ExitCode run(const char* kind, SimulateArguments arguments, const SetUp& set_up)
   engine->set_filter(start.filter);
   std::unique_ptr<ContactsAhead> ahead;
   if (options.solver.method != SolverMethod::sweeps)
-    ahead = std::make_unique<ContactsAhead>(start.shapes(), options.threads, start.filter);
+    ahead = std::make_unique<ContactsAhead>(start.shapes(), options.threads, &start.filter);
   std::unique_ptr<ContinuousMotion> continuous;
   if (arguments.continuous)
-    continuous = std::make_unique<ContinuousMotion>(start.shapes(), options.threads, start.filter);
+    continuous = std::make_unique<ContinuousMotion>(start.shapes(), options.threads, &start.filter);
   // What World does.
   const bool is_world = arguments.engine == "tandem" && !arguments.fast && !arguments.ask_all;
   Simulator simulator(start.bodies.bodies, start.bodies.states,
-                      is_world ? make_scene_contacts(start.shapes(), options.threads, start.filter)
+                      is_world ? make_scene_contacts(start.shapes(), options.threads, &start.filter)
                                : make_mesh_contact_finder(std::move(engine), start.shapes(), options.threads,
                                                           arguments.ask_all),
                       options, std::move(continuous), std::move(ahead));

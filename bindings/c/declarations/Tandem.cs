@@ -468,6 +468,8 @@ public unsafe struct tandem_joint {
   public double most;
   public double speed;
   public double most_effort;
+  public double breaking_force;
+  public double breaking_torque;
 }
 
 [StructLayout(LayoutKind.Sequential)]
@@ -507,12 +509,23 @@ public unsafe struct tandem_world_contact {
 }
 
 [StructLayout(LayoutKind.Sequential)]
+public unsafe struct tandem_world_touch {
+  public uint a;
+  public uint b;
+  public double impulse;
+  public double speed;
+  public fixed double position[3];
+}
+
+[StructLayout(LayoutKind.Sequential)]
 public unsafe struct tandem_world_joint {
   public double position;
   public double speed;
   public fixed double impulse[3];
   public fixed double turning[3];
   public double motor_effort;
+  public byte holds;
+  public fixed byte reserved[7];
 }
 
 public static unsafe class Native {
@@ -712,14 +725,19 @@ public static unsafe class Native {
   [DllImport("tandem")] public static extern uint tandem_world_step(IntPtr world, double dt, uint steps);
   [DllImport("tandem")] public static extern tandem_body_motion* tandem_world_bodies(IntPtr world, UIntPtr* count);
   [DllImport("tandem")] public static extern tandem_world_contact* tandem_world_contacts(IntPtr world, UIntPtr* count);
-  [DllImport("tandem")] public static extern tandem_object_pair* tandem_world_touching(IntPtr world, UIntPtr* count);
-  [DllImport("tandem")] public static extern tandem_object_pair* tandem_world_began(IntPtr world, UIntPtr* count);
+  [DllImport("tandem")] public static extern tandem_world_touch* tandem_world_touching(IntPtr world, UIntPtr* count);
+  [DllImport("tandem")] public static extern tandem_world_touch* tandem_world_began(IntPtr world, UIntPtr* count);
   [DllImport("tandem")] public static extern tandem_object_pair* tandem_world_ended(IntPtr world, UIntPtr* count);
   [DllImport("tandem")] public static extern tandem_world_joint* tandem_world_joints(IntPtr world, UIntPtr* count);
+  [DllImport("tandem")] public static extern uint* tandem_world_broken(IntPtr world, UIntPtr* count);
+  [DllImport("tandem")] public static extern uint tandem_world_add_joint(IntPtr world, tandem_joint* joint, uint* place);
+  [DllImport("tandem")] public static extern uint tandem_world_remove_joint(IntPtr world, uint joint);
   [DllImport("tandem")] public static extern uint tandem_world_set_motor(IntPtr world, uint joint, double speed, double most_effort);
   [DllImport("tandem")] public static extern double tandem_world_time(IntPtr world);
   [DllImport("tandem")] public static extern double tandem_world_mass(IntPtr world, uint body);
   [DllImport("tandem")] public static extern uint tandem_world_set_body(IntPtr world, uint body, tandem_body_motion* motion);
+  [DllImport("tandem")] public static extern uint tandem_world_set_material(IntPtr world, uint body, double friction, double restitution, double rolling_resistance);
+  [DllImport("tandem")] public static extern uint tandem_world_set_gravity_scale(IntPtr world, uint body, double gravity_scale);
   [DllImport("tandem")] public static extern uint tandem_world_push(IntPtr world, uint body, double* impulse, double* at);
   [DllImport("tandem")] public static extern uint tandem_world_set_force(IntPtr world, uint body, double* force, double* torque);
   [DllImport("tandem")] public static extern uint tandem_world_save(IntPtr world, IntPtr* state);

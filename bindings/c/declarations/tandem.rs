@@ -678,6 +678,8 @@ pub struct tandem_joint {
     pub most: f64,
     pub speed: f64,
     pub most_effort: f64,
+    pub breaking_force: f64,
+    pub breaking_torque: f64,
 }
 
 #[repr(C)]
@@ -721,12 +723,24 @@ pub struct tandem_world_contact {
 
 #[repr(C)]
 #[derive(Clone, Copy)]
+pub struct tandem_world_touch {
+    pub a: u32,
+    pub b: u32,
+    pub impulse: f64,
+    pub speed: f64,
+    pub position: [f64; 3],
+}
+
+#[repr(C)]
+#[derive(Clone, Copy)]
 pub struct tandem_world_joint {
     pub position: f64,
     pub speed: f64,
     pub impulse: [f64; 3],
     pub turning: [f64; 3],
     pub motor_effort: f64,
+    pub holds: u8,
+    pub reserved: [u8; 7],
 }
 
 #[link(name = "tandem")]
@@ -791,14 +805,19 @@ extern "C" {
     pub fn tandem_world_step(world: *mut tandem_world, dt: f64, steps: u32) -> tandem_status;
     pub fn tandem_world_bodies(world: *const tandem_world, count: *mut usize) -> *const tandem_body_motion;
     pub fn tandem_world_contacts(world: *const tandem_world, count: *mut usize) -> *const tandem_world_contact;
-    pub fn tandem_world_touching(world: *const tandem_world, count: *mut usize) -> *const tandem_object_pair;
-    pub fn tandem_world_began(world: *const tandem_world, count: *mut usize) -> *const tandem_object_pair;
+    pub fn tandem_world_touching(world: *const tandem_world, count: *mut usize) -> *const tandem_world_touch;
+    pub fn tandem_world_began(world: *const tandem_world, count: *mut usize) -> *const tandem_world_touch;
     pub fn tandem_world_ended(world: *const tandem_world, count: *mut usize) -> *const tandem_object_pair;
     pub fn tandem_world_joints(world: *const tandem_world, count: *mut usize) -> *const tandem_world_joint;
+    pub fn tandem_world_broken(world: *const tandem_world, count: *mut usize) -> *const u32;
+    pub fn tandem_world_add_joint(world: *mut tandem_world, joint: *const tandem_joint, place: *mut u32) -> tandem_status;
+    pub fn tandem_world_remove_joint(world: *mut tandem_world, joint: u32) -> tandem_status;
     pub fn tandem_world_set_motor(world: *mut tandem_world, joint: u32, speed: f64, most_effort: f64) -> tandem_status;
     pub fn tandem_world_time(world: *const tandem_world) -> f64;
     pub fn tandem_world_mass(world: *const tandem_world, body: u32) -> f64;
     pub fn tandem_world_set_body(world: *mut tandem_world, body: u32, motion: *const tandem_body_motion) -> tandem_status;
+    pub fn tandem_world_set_material(world: *mut tandem_world, body: u32, friction: f64, restitution: f64, rolling_resistance: f64) -> tandem_status;
+    pub fn tandem_world_set_gravity_scale(world: *mut tandem_world, body: u32, gravity_scale: f64) -> tandem_status;
     pub fn tandem_world_push(world: *mut tandem_world, body: u32, impulse: *const f64, at: *const f64) -> tandem_status;
     pub fn tandem_world_set_force(world: *mut tandem_world, body: u32, force: *const f64, torque: *const f64) -> tandem_status;
     pub fn tandem_world_save(world: *const tandem_world, state: *mut *mut tandem_world_state) -> tandem_status;

@@ -48,5 +48,7 @@ struct Same_tandem_body_motion { using Ours = BodyMotion; using Theirs = tandem_
   TANDEM_SAME(centre); TANDEM_SAME(velocity); TANDEM_SAME(angular_velocity); TANDEM_SAME(sleeps); };
 struct Same_tandem_world_contact { using Ours = WorldContact; using Theirs = tandem_world_contact; TANDEM_SAME_SIZE(); TANDEM_SAME(a); TANDEM_SAME(b);
   TANDEM_SAME(position); TANDEM_SAME(normal); TANDEM_SAME(depth); TANDEM_SAME(impulse); };
+struct Same_tandem_world_touch { using Ours = WorldTouch; using Theirs = tandem_world_touch; TANDEM_SAME_SIZE(); TANDEM_SAME(a); TANDEM_SAME(b);
+  TANDEM_SAME(impulse); TANDEM_SAME(speed); TANDEM_SAME(position); };
 struct Same_tandem_world_joint { using Ours = WorldJoint; using Theirs = tandem_world_joint; TANDEM_SAME_SIZE(); TANDEM_SAME(position);
-  TANDEM_SAME(speed); TANDEM_SAME(impulse); TANDEM_SAME(turning); TANDEM_SAME(motor_effort); };
+  TANDEM_SAME(speed); TANDEM_SAME(impulse); TANDEM_SAME(turning); TANDEM_SAME(motor_effort); TANDEM_SAME(holds); };

@@ -117,27 +117,35 @@ tandem_status read_excluded(const tandem_excluded_pairs* given, size_t bodies, s
   return TANDEM_OK;
 }
 
+// Result: TANDEM_OK or TANDEM_BAD_JOINT.
+tandem_status read_joint(const tandem_joint& from, JointDescription& joint) {
+  const bool is_limited = from.has_limits != 0 || from.least != 0 || from.most != 0;
+  if (from.kind > TANDEM_DISTANCE || from.has_limits > 1 || from.may_touch > 1 ||
+      (is_limited && from.has_limits == 0) || from.reserved[0] != 0 || from.reserved[1] != 0)
+    return TANDEM_BAD_JOINT;
+  joint.kind = static_cast<JointKind>(from.kind);
+  joint.a = from.a, joint.b = from.b;
+  std::ranges::copy(from.anchor, joint.anchor);
+  std::ranges::copy(from.anchor_b, joint.anchor_b);
+  std::ranges::copy(from.axis, joint.axis);
+  if (from.has_limits != 0) joint.least = from.least, joint.most = from.most;
+  joint.speed = from.speed, joint.most_effort = from.most_effort;
+  if (from.breaking_force != 0) joint.breaking_force = from.breaking_force;
+  if (from.breaking_torque != 0) joint.breaking_torque = from.breaking_torque;
+  joint.may_touch = from.may_touch != 0;
+  return TANDEM_OK;
+}
+
 // Result: TANDEM_OK, TANDEM_NULL_ARGUMENT or, where `where` is the joint, TANDEM_BAD_JOINT.
 tandem_status read_joints(const tandem_body_start& given, std::vector<JointDescription>& joints,
                           uint64_t& where) {
   if (!is_there(given.joints, given.joint_count)) return TANDEM_NULL_ARGUMENT;
   for (size_t i = 0; i < given.joint_count; ++i) {
-    const tandem_joint& from = given.joints[i];
-    const bool is_limited = from.has_limits != 0 || from.least != 0 || from.most != 0;
-    if (from.kind > TANDEM_DISTANCE || from.has_limits > 1 || from.may_touch > 1 ||
-        (is_limited && from.has_limits == 0) || from.reserved[0] != 0 || from.reserved[1] != 0) {
+    if (const tandem_status status = read_joint(given.joints[i], joints.emplace_back());
+        status != TANDEM_OK) {
       where = i;
-      return TANDEM_BAD_JOINT;
+      return status;
     }
-    JointDescription& joint = joints.emplace_back();
-    joint.kind = static_cast<JointKind>(from.kind);
-    joint.a = from.a, joint.b = from.b;
-    std::ranges::copy(from.anchor, joint.anchor);
-    std::ranges::copy(from.anchor_b, joint.anchor_b);
-    std::ranges::copy(from.axis, joint.axis);
-    if (from.has_limits != 0) joint.least = from.least, joint.most = from.most;
-    joint.speed = from.speed, joint.most_effort = from.most_effort;
-    joint.may_touch = from.may_touch != 0;
   }
   return TANDEM_OK;
 }
@@ -220,12 +228,12 @@ const tandem_world_contact* tandem_world_contacts(const tandem_world* world, siz
   return rows_of<tandem_world_contact>(world, &World::contacts, count);
 }
 
-const tandem_object_pair* tandem_world_touching(const tandem_world* world, size_t* count) {
-  return rows_of<tandem_object_pair>(world, &World::touching, count);
+const tandem_world_touch* tandem_world_touching(const tandem_world* world, size_t* count) {
+  return rows_of<tandem_world_touch>(world, &World::touching, count);
 }
 
-const tandem_object_pair* tandem_world_began(const tandem_world* world, size_t* count) {
-  return rows_of<tandem_object_pair>(world, &World::began, count);
+const tandem_world_touch* tandem_world_began(const tandem_world* world, size_t* count) {
+  return rows_of<tandem_world_touch>(world, &World::began, count);
 }
 
 const tandem_object_pair* tandem_world_ended(const tandem_world* world, size_t* count) {
@@ -233,8 +241,24 @@ const tandem_object_pair* tandem_world_ended(const tandem_world* world, size_t* 
 }
 
 const tandem_world_joint* tandem_world_joints(const tandem_world* world, size_t* count) {
-  return result<tandem_world_joint>(world != nullptr ? world->world.joints() : std::span<const WorldJoint>(),
-                                    count);
+  return rows_of<tandem_world_joint>(world, &World::joints, count);
+}
+
+const uint32_t* tandem_world_broken(const tandem_world* world, size_t* count) {
+  return rows_of<uint32_t>(world, &World::broken, count);
+}
+
+tandem_status tandem_world_add_joint(tandem_world* world, const tandem_joint* joint, uint32_t* place) {
+  return enter(world, [&](tandem_world& self) -> tandem_status {
+    if (joint == nullptr || place == nullptr) return TANDEM_NULL_ARGUMENT;
+    JointDescription read;
+    const tandem_status status = read_joint(*joint, read);
+    return status == TANDEM_OK ? self.told(self.world.add_joint(read, *place)) : status;
+  });
+}
+
+tandem_status tandem_world_remove_joint(tandem_world* world, uint32_t joint) {
+  return enter(world, [&](tandem_world& self) { return self.told(self.world.remove_joint(joint)); });
 }
 
 tandem_status tandem_world_set_motor(tandem_world* world, uint32_t joint, double speed, double most_effort) {
@@ -258,6 +282,19 @@ tandem_status tandem_world_set_body(tandem_world* world, uint32_t body, const ta
     std::ranges::copy(motion->velocity, read.velocity);
     std::ranges::copy(motion->angular_velocity, read.angular_velocity);
     return self.told(self.world.set(body, read));
+  });
+}
+
+tandem_status tandem_world_set_material(tandem_world* world, uint32_t body, double friction,
+                                        double restitution, double rolling_resistance) {
+  return enter(world, [&](tandem_world& self) {
+    return self.told(self.world.set_material(body, {friction, restitution, rolling_resistance}));
+  });
+}
+
+tandem_status tandem_world_set_gravity_scale(tandem_world* world, uint32_t body, double gravity_scale) {
+  return enter(world, [&](tandem_world& self) {
+    return self.told(self.world.set_gravity_scale(body, gravity_scale));
   });
 }
 

@@ -1,11 +1,10 @@
 #include <algorithm>
 #include <chrono>
-#include <iterator>
 #include <memory>
-#include <tuple>
 #include <utility>
 
 #include "core.h"
+#include "dynamics/lists_of_steps.h"
 
 namespace tandem::python {
 namespace {
@@ -36,8 +35,6 @@ std::vector<double> numbers_of(nb::handle given, std::size_t bodies, std::size_t
 }
 
 class World {
-  using Pairs = std::vector<tandem_object_pair>;
-
  public:
   World(nb::list assets, nb::handle gravity, nb::handle friction, double restitution, nb::handle slop,
         nb::handle rolling_resistance, std::uint32_t substeps, bool sleeping, bool continuous,
@@ -84,7 +81,7 @@ class World {
     take(restitution, 1, start.restitution);
     take(rolling_resistance, 1, start.rolling_resistance);
     take(gravity_scale, 1, start.gravity_scale);
-    began_.clear(), ended_.clear();
+    forget_call();
     const auto joined = copy_rows<tandem_joint>(joints);
     start.joints = joined.data(), start.joint_count = joined.size();
     ask([&](tandem_world* world) {
@@ -97,15 +94,14 @@ class World {
     using Clock = std::chrono::steady_clock;
     const Turn turn = take_turn();
     std::uint64_t done = 0;
-    began_.clear(), ended_.clear();
+    forget_call();
     do {
       ask([&](tandem_world* world) {
         const auto soon = Clock::now() + std::chrono::milliseconds(50);
         tandem_status status = TANDEM_OK;
         do {
           status = tandem_world_step(world, dt, done < steps);
-          add<tandem_world_began>(began_);
-          add<tandem_world_ended>(ended_);
+          take_changes();
         } while (status == TANDEM_OK && ++done < steps && Clock::now() < soon);
         return status;
       });
@@ -133,8 +129,34 @@ class World {
   nb::object touching() { return rows<tandem_world_touching>(); }
   nb::object began() { return copy_of(began_); }
   nb::object ended() { return copy_of(ended_); }
-
+  nb::object broken() { return copy_of(broken_); }
   nb::object joints() { return rows<tandem_world_joints>(); }
+
+  std::uint32_t add_joint(nb::handle joint) {
+    const Turn turn = take_turn();
+    const auto rows = copy_rows<tandem_joint>(joint);
+    if (rows.size() != 1) throw_broken_rows();
+    std::uint32_t place = 0;
+    ask([&](tandem_world* world) { return tandem_world_add_joint(world, rows.data(), &place); });
+    return place;
+  }
+
+  void remove_joint(std::uint32_t joint) {
+    const Turn turn = take_turn();
+    ask([&](tandem_world* world) { return tandem_world_remove_joint(world, joint); });
+  }
+
+  void set_material(std::uint32_t body, double friction, double restitution, double rolling_resistance) {
+    const Turn turn = take_turn();
+    ask([&](tandem_world* world) {
+      return tandem_world_set_material(world, body, friction, restitution, rolling_resistance);
+    });
+  }
+
+  void set_gravity_scale(std::uint32_t body, double scale) {
+    const Turn turn = take_turn();
+    ask([&](tandem_world* world) { return tandem_world_set_gravity_scale(world, body, scale); });
+  }
 
   void set_motor(std::uint32_t joint, double speed, double most_effort) {
     const Turn turn = take_turn();
@@ -168,7 +190,7 @@ class World {
 
   void restore(const WorldState& state) {
     const Turn turn = take_turn();
-    began_.clear(), ended_.clear();
+    forget_call();
     ask([&](tandem_world* world) { return tandem_world_restore(world, state.get()); });
   }
 
@@ -201,24 +223,31 @@ class World {
     return to_python(first, count);
   }
 
-  nb::object copy_of(const Pairs& pairs) {
+  template <typename Row>
+  nb::object copy_of(const std::vector<Row>& rows) {
     const Turn turn = take_turn();
-    return to_python(pairs.data(), pairs.size());
+    return to_python(rows.data(), rows.size());
   }
 
-  // Adds the pairs of a step to those of the steps before; both are ascending.
-  template <auto get>
-  void add(Pairs& to) const {
-    std::size_t count;
-    const tandem_object_pair* first = get(world_.get(), &count);
-    if (count == 0) return;
-    Pairs all;
-    std::set_union(to.begin(), to.end(), first, first + count, std::back_inserter(all),
-                   [](const auto& p, const auto& q) { return std::tie(p.a, p.b) < std::tie(q.a, q.b); });
-    to = std::move(all);
+  void forget_call() { began_.clear(), ended_.clear(), broken_.clear(); }
+
+  // Adds what a step changed to the lists of the call.
+  void take_changes() {
+    const auto told = [&](auto get) {
+      std::size_t count;
+      const auto* first = get(world_.get(), &count);
+      return std::span(first, count);
+    };
+    dynamics::add_touches(told(tandem_world_began), told(tandem_world_touching), began_);
+    dynamics::add_pairs(told(tandem_world_ended), ended_);
+    std::ranges::copy(told(tandem_world_broken), std::back_inserter(broken_));
+    std::ranges::sort(broken_);
   }
 
-  Pairs began_, ended_;  // in the last call of step()
+  // In the last call of step():
+  std::vector<tandem_world_touch> began_;
+  std::vector<tandem_object_pair> ended_;
+  std::vector<std::uint32_t> broken_;
   std::unique_ptr<tandem_world, decltype(&tandem_world_destroy)> world_{nullptr, tandem_world_destroy};
   std::atomic<bool> busy_ = false;
 };
@@ -244,7 +273,12 @@ void add_worlds(nb::module_& module) {
       .def("touching", &World::touching)
       .def("began", &World::began)
       .def("ended", &World::ended)
+      .def("broken", &World::broken)
       .def("joints", &World::joints)
+      .def("add_joint", &World::add_joint)
+      .def("remove_joint", &World::remove_joint)
+      .def("set_material", &World::set_material)
+      .def("set_gravity_scale", &World::set_gravity_scale)
       .def("set_motor", &World::set_motor)
       .def("count", &World::count)
       .def("time", &World::time)

@@ -2,7 +2,7 @@
 wherever it copies. Written by scripts/write_interface from it. Do not edit it."""
 import numpy as np
 
-__all__ = ["BODY_AT", "BODY_MOTION", "CONTACT", "CONTAINMENT", "DISTANCE", "FORMER", "IMPACT", "INSTANCE", "JOINT", "MANIFOLD", "MOTION", "NO_INDEX", "PAIR", "POINT", "VERDICT", "WORLD_CONTACT", "WORLD_JOINT"]
+__all__ = ["BODY_AT", "BODY_MOTION", "CONTACT", "CONTAINMENT", "DISTANCE", "FORMER", "IMPACT", "INSTANCE", "JOINT", "MANIFOLD", "MOTION", "NO_INDEX", "PAIR", "POINT", "VERDICT", "WORLD_CONTACT", "WORLD_JOINT", "WORLD_TOUCH"]
 
 #: What is not there: a triangle, a face, a former point, the asset of a removed body.
 NO_INDEX = 0xFFFFFFFF
@@ -41,9 +41,13 @@ BODY_MOTION = np.dtype([("rotation", "<f8", (3, 3)), ("translation", "<f8", (3,)
         ("angular_velocity", "<f8", (3,)), ("sleeps", "u1"), ("reserved", "u1", (7,))])
 #: A point where two bodies touch, or nearly so, and what they did there in the last step.
 WORLD_CONTACT = np.dtype([("a", "<u4"), ("b", "<u4"), ("position", "<f8", (3,)), ("normal", "<f8", (3,)), ("depth", "<f8"), ("impulse", "<f8", (3,))])
+#: Two bodies that touch, and how hard.
+WORLD_TOUCH = np.dtype([("a", "<u4"), ("b", "<u4"), ("impulse", "<f8"), ("speed", "<f8"), ("position", "<f8", (3,))])
 #: Two bodies, of which at least one moves, joined as they are placed. Anchors and axis are those of the world at that time, and the bodies carry them
 #: along.
 JOINT = np.dtype([("kind", "<u4"), ("a", "<u4"), ("b", "<u4"), ("has_limits", "u1"), ("may_touch", "u1"), ("reserved", "u1", (2,)), ("anchor", "<f8",
-        (3,)), ("anchor_b", "<f8", (3,)), ("axis", "<f8", (3,)), ("least", "<f8"), ("most", "<f8"), ("speed", "<f8"), ("most_effort", "<f8")])
+        (3,)), ("anchor_b", "<f8", (3,)), ("axis", "<f8", (3,)), ("least", "<f8"), ("most", "<f8"), ("speed", "<f8"), ("most_effort", "<f8"),
+        ("breaking_force", "<f8"), ("breaking_torque", "<f8")])
 #: What a joint did in the last step, and where it is.
-WORLD_JOINT = np.dtype([("position", "<f8"), ("speed", "<f8"), ("impulse", "<f8", (3,)), ("turning", "<f8", (3,)), ("motor_effort", "<f8")])
+WORLD_JOINT = np.dtype([("position", "<f8"), ("speed", "<f8"), ("impulse", "<f8", (3,)), ("turning", "<f8", (3,)), ("motor_effort", "<f8"), ("holds",
+        "u1"), ("reserved", "u1", (7,))])

@@ -13,7 +13,7 @@ from ._arrays import Rotations, Rows, amount, flag, floats, instances_of, number
 from ._asset import Asset
 from ._errors import Error
 from ._poses import explained
-from ._rows import BODY_MOTION, INSTANCE, JOINT, NO_INDEX, PAIR, WORLD_CONTACT, WORLD_JOINT
+from ._rows import BODY_MOTION, INSTANCE, JOINT, NO_INDEX, PAIR, WORLD_CONTACT, WORLD_JOINT, WORLD_TOUCH
 from ._scene import Filter, _core_of, cores_of
 
 __all__ = ["Joint", "World", "WorldState"]
@@ -38,6 +38,8 @@ class Joint:
         speed: that the motor of a hinge or slider drives b at, against a.
         most_effort: its greatest torque or force; 0: there is no motor.
         may_touch: the two bodies have contacts with each other.
+        breaking_force, breaking_torque: the mean force or torque in a step beyond which it lets go at the end of the step, its motor and limits included: about b's
+            anchor, in newtons and newton metres. None: it does not break.
     """
 
     kind: str
@@ -50,6 +52,15 @@ class Joint:
     speed: float = 0.0
     most_effort: float = 0.0
     may_touch: bool = False
+    breaking_force: float | None = None
+    breaking_torque: float | None = None
+
+
+def _breaking(value: float, name: str) -> float:
+    most = number(value, name)
+    if not most > 0:
+        raise ValueError(f"{name} is {most} where more than 0 is wanted")
+    return most
 
 
 _KINDS = ("ball", "hinge", "slider", "fixed", "distance")
@@ -70,6 +81,8 @@ def _joint_rows(joints: Sequence[Joint]) -> Rows:
             row["least"], row["most"] = joint.limits
         row["speed"], row["most_effort"] = number(joint.speed, "speed"), number(joint.most_effort, "most_effort")
         row["may_touch"] = flag(joint.may_touch, "may_touch")
+        for name, most in (("breaking_force", joint.breaking_force), ("breaking_torque", joint.breaking_torque)):
+            row[name] = 0 if most is None else _breaking(most, name)
     return rows
 
 
@@ -227,7 +240,8 @@ class World:
 
     def move(self, body: int, *, rotation: Rotations | None = None, translation: npt.ArrayLike | None = None, transform: npt.ArrayLike | None = None,
              velocity: npt.ArrayLike | None = None, angular_velocity: npt.ArrayLike | None = None) -> None:
-        """Puts a body elsewhere or gives it other velocities, and wakes it.
+        """Puts a body elsewhere or gives it other velocities, and wakes it. A fixed or kinematic body wakes what touches it or is joined to it, there and at its new
+        place; a fixed one has no velocities.
 
         Args:
             rotation, translation, transform: of one body (see `tandem.instances`); it stays where none of these is given.
@@ -283,9 +297,58 @@ class World:
         """
         self._core.set_force(self._body(body), _vector(force, "force"), _vector(torque, "torque"))
 
+    def set_material(self, body: int, *, friction: float | None = None, restitution: float | None = None, rolling_resistance: float | None = None) -> None:
+        """Gives a body another material in place of the one that it has; None, or less than 0: as of the world. States keep it. Where it is not what it was, the body
+        wakes, and of a fixed or kinematic body what touches it or is joined to it.
+
+        >>> fixed = tandem.Filter(motion=[tandem.FIXED, tandem.MOVING])
+        >>> world = tandem.World([box], translation=[[0, 0, 0], [0, 0, 1]], filter=fixed, gravity=[2, 0, -9.81])
+        >>> world.step(1 / 60, 60)
+        >>> world.set_material(0, friction=0)
+        >>> world.step(1 / 60, 12)
+        >>> world.velocity[:, 0].round(2).tolist()
+        [0.0, 0.4]
+        """
+        row = self._body(body)
+        given = (("friction", friction, _MOST), ("restitution", restitution, 1.0), ("rolling_resistance", rolling_resistance, _MOST))
+        material = []
+        for name, value, most in given:
+            material.append(-1.0 if value is None else number(value, name))
+            if not material[-1] <= most:
+                raise ValueError(f"{name} is {material[-1]} where at most {most:g} is wanted")
+        self._core.set_material(row, *material)
+
+    def set_gravity_scale(self, body: int, gravity_scale: float) -> None:
+        """Sets the part of gravity that acts on a body; 0: it floats. States keep it. Wakes as `set_material` does."""
+        self._core.set_gravity_scale(self._body(body), number(gravity_scale, "gravity_scale"))
+
+    def add_joint(self, joint: Joint) -> int:
+        """Joins bodies as they are now, and wakes them. Returns the joint's place in `joints`: the first from which a joint has been removed, or else one at the end.
+
+        Raises:
+            Error: a body that there is not, two that nothing moves, no axis, or numbers that the kind cannot have. Nothing has changed then.
+
+        >>> world = tandem.World([box], translation=[0, 0, 5])
+        >>> world.step(1 / 60, 30)
+        >>> world.add_joint(tandem.Joint("fixed", None, 0, anchor=world.translation[0], breaking_force=1e6))
+        0
+        >>> world.step(1 / 60, 30)
+        >>> world.joints["holds"].tolist(), world.broken.tolist()
+        ([1], [])
+        >>> world.remove_joint(0)
+        >>> world.step(1 / 60, 60)
+        >>> world.velocity.round(2).tolist()
+        [[0.0, 0.0, -9.81]]
+        """
+        return self._core.add_joint(_joint_rows([joint]))
+
+    def remove_joint(self, joint: int) -> None:
+        """Removes a joint, broken or not, and wakes the bodies. Others keep their places. Error, where `where` is the joint: there is none such."""
+        self._core.remove_joint(whole_number(joint, "joint", 0, NO_INDEX))
+
     def set_motor(self, joint: int, speed: float, most_effort: float) -> None:
         """Gives the motor of a hinge or slider another speed and greatest torque or force, and wakes the bodies. Error, where `where` is the joint: there is none
-        such, or it has no motor."""
+        such, it has broken, or it has no motor."""
         self._core.set_motor(whole_number(joint, "joint", 0, NO_INDEX), number(speed, "speed"), number(most_effort, "most_effort"))
 
     def save(self) -> WorldState:
@@ -386,34 +449,44 @@ class World:
 
     @property
     def touching(self) -> Rows:
-        """The pairs of bodies that touch in the last step, a copy, array of PAIR, ascending: at its start they had a contact that is no gap, or one of their contacts
-        pushed in it. Two bodies that sleep go on as they were.
+        """The pairs of bodies that touch in the last step, a copy, array of WORLD_TOUCH, ascending: at its start they had a contact that is no gap, or one of their
+        contacts pushed in it. Two bodies that sleep go on as they were. `impulse` says how hard they pushed each other apart, in newton seconds, `position`
+        where the hardest contact is, and `speed` how fast they approached each other at the start of the step.
 
         >>> world = tandem.World([box], translation=[[0, 0, 0], [0, 0, 1.01]], filter=tandem.Filter(motion=[tandem.FIXED, tandem.MOVING]))
         >>> for _ in range(5):
         ...     world.step(1 / 60)
-        ...     print(world.touching.tolist(), "began:", world.began.tolist())
+        ...     print(world.touching[["a", "b"]].tolist(), "began:", world.began["speed"].round(2).tolist())
         [] began: []
         [] began: []
-        [(0, 1)] began: [(0, 1)]
+        [(0, 1)] began: [0.33]
         [(0, 1)] began: []
         [(0, 1)] began: []
         """
-        return np.frombuffer(self._core.touching(), PAIR)
+        return np.frombuffer(self._core.touching(), WORLD_TOUCH)
 
     @property
     def began(self) -> Rows:
-        """The pairs that came to touch in any of the steps of the last call of `step`, a copy, array of PAIR, ascending; a pair that bounced is in `ended` too."""
-        return np.frombuffer(self._core.began(), PAIR)
+        """The pairs that came to touch in any of the steps of the last call of `step`, a copy, array of WORLD_TOUCH, ascending; a pair that bounced is in `ended` too.
+        Each has the numbers of the step of the call, from when the pair began to touch, in which it pushed hardest, and the largest speed: an impact often takes two
+        steps, the first of which lets the bodies come as far as they meet."""
+        return np.frombuffer(self._core.began(), WORLD_TOUCH)
 
     @property
     def ended(self) -> Rows:
-        """The pairs that came to touch no longer, as `began`."""
+        """The pairs that came to touch no longer in any of the steps of the last call of `step`, a copy, array of PAIR, ascending."""
         return np.frombuffer(self._core.ended(), PAIR)
 
     @property
+    def broken(self) -> npt.NDArray[np.uint32]:
+        """The joints that broke in any of the steps of the last call of `step`, a copy, ascending. A broken joint keeps its place until it is removed, and its bodies may
+        touch from the next step on."""
+        return np.frombuffer(self._core.broken(), np.uint32)
+
+    @property
     def joints(self) -> Rows:
-        """What the joints did in the last step, a copy, array of WORLD_JOINT in the order they were given: angle, way or distance, its speed, and impulses.
+        """What the joints did in the last step, a copy, array of WORLD_JOINT in the order they were given: angle, way or distance, its speed, impulses, and whether they
+        hold.
 
         >>> hinge = tandem.Joint("hinge", None, 0, anchor=[0, 0, 5], axis=[0, 0, 1], speed=2, most_effort=1e6)
         >>> world = tandem.World([box], translation=[[0, 0, 4]], joints=[hinge])

@@ -337,6 +337,7 @@ class SweepSolver final : public StepSolver {
         advance(input.bodies[body], states[body], corrections_[body].velocity, corrections_[body].spin, dt);
       }
     }
+    if (!input.done.empty()) std::ranges::copy(impulses, input.done.begin());
   }
 
  private:

@@ -838,6 +838,9 @@ typedef struct tandem_joint {
                        ///< which without limits stays what it is; may be infinite
   double speed;        ///< that the motor of a hinge or slider drives b at, against a
   double most_effort;  ///< its greatest torque or force; 0: there is no motor
+  /// The mean force or torque in a step beyond which it lets go at the end of the step, its motor and limits
+  /// included: about b's anchor, in newtons and newton metres. 0: it does not break.
+  double breaking_force, breaking_torque;
 } tandem_joint;
 
 /// How bodies start. Arrays have `count` entries, one for each body (TANDEM_MOTION_MISMATCH where there are
@@ -904,13 +907,26 @@ typedef struct tandem_world_contact {
 /// bodies. Valid as long as tandem_world_bodies().
 TANDEM_API const tandem_world_contact* tandem_world_contacts(const tandem_world* world, size_t* count);
 
+/// Two bodies that touch, and how hard.
+typedef struct tandem_world_touch {
+  uint32_t a, b;   ///< a < b
+  double impulse;  ///< by which they push each other apart in a step: the sum over their contacts of those
+                   ///< along the normals. Newton seconds
+  double speed;    ///< at which they approach each other at the start of the step, the largest of their
+                   ///< contacts along its normal; 0 where they part
+  double position[3];  ///< of the contact that pushes hardest, or of the deepest where none pushes
+} tandem_world_touch;
+
 /// Return pairs of bodies, a < b, ascending. Valid as long as tandem_world_bodies().
 /// touching: the pairs that touch in the last step: at its start they had a contact that is no gap, or one of
 /// their contacts pushed in it. Two bodies that sleep go on as they were.
 /// began, ended: the pairs that came to touch, or to touch no longer, in any of the steps of the last
-/// tandem_world_step(); a pair that bounced in it is in both. Empty after tandem_world_restore().
-TANDEM_API const tandem_object_pair* tandem_world_touching(const tandem_world* world, size_t* count);
-TANDEM_API const tandem_object_pair* tandem_world_began(const tandem_world* world, size_t* count);
+/// tandem_world_step(); a pair that bounced in it is in both. Pairs of began have the numbers of
+/// the step of the call, from when they began to touch, in which they pushed hardest, and the largest speed:
+/// an impact often takes two steps, the first of which lets the bodies come as far as they meet. Empty after
+/// tandem_world_restore().
+TANDEM_API const tandem_world_touch* tandem_world_touching(const tandem_world* world, size_t* count);
+TANDEM_API const tandem_world_touch* tandem_world_began(const tandem_world* world, size_t* count);
 TANDEM_API const tandem_object_pair* tandem_world_ended(const tandem_world* world, size_t* count);
 
 /// What a joint did in the last step, and where it is.
@@ -920,13 +936,30 @@ typedef struct tandem_world_joint {
   double impulse[3];    ///< on b at its anchor, on a the opposite one, in the world. Newton seconds
   double turning[3];    ///< the same of torques. Newton metre seconds
   double motor_effort;  ///< mean torque or force of the motor in the step, along the axis on b
+  uint8_t holds;        ///< 0: it has broken, or been removed
+  uint8_t reserved[7];
 } tandem_world_joint;
 
 /// Returns the joints in the order they were given. Valid as long as tandem_world_bodies().
 TANDEM_API const tandem_world_joint* tandem_world_joints(const tandem_world* world, size_t* count);
 
+/// Returns the joints that broke in any of the steps of the last tandem_world_step(), ascending. A broken
+/// joint keeps its place until it is removed, and its bodies may touch from the next step on. Empty after
+/// tandem_world_restore(). Valid as long as tandem_world_bodies().
+TANDEM_API const uint32_t* tandem_world_broken(const tandem_world* world, size_t* count);
+
+/// Joins bodies as they are now, and wakes them. place: of the joint among tandem_world_joints(), the first
+/// from which one has been removed, or else one at the end. Result: as of joints in
+/// tandem_world_set_bodies(). After an error nothing has changed.
+TANDEM_API tandem_status tandem_world_add_joint(tandem_world* world, const tandem_joint* joint,
+                                                uint32_t* place);
+
+/// Removes a joint, broken or not, and wakes the bodies. Others keep their places. Result: TANDEM_BAD_JOINT,
+/// where tandem_world_where() is the joint.
+TANDEM_API tandem_status tandem_world_remove_joint(tandem_world* world, uint32_t joint);
+
 /// Gives the motor of a hinge or slider another speed and greatest effort, and wakes the bodies. Result:
-/// TANDEM_BAD_JOINT, where tandem_world_where() is the joint.
+/// TANDEM_BAD_JOINT, where tandem_world_where() is the joint, also of one that has broken.
 TANDEM_API tandem_status tandem_world_set_motor(tandem_world* world, uint32_t joint, double speed,
                                                 double most_effort);
 
@@ -937,10 +970,20 @@ TANDEM_API double tandem_world_time(const tandem_world* world);
 TANDEM_API double tandem_world_mass(const tandem_world* world, uint32_t body);
 
 /// Puts a body elsewhere or gives it other velocities, and wakes it. `centre` and `sleeps` are not looked at.
-/// Result, where tandem_world_where() is the body: TANDEM_UNKNOWN_INSTANCE, TANDEM_POSE_NOT_RIGID,
-/// TANDEM_OUT_OF_RANGE. After an error nothing has changed.
+/// A fixed or kinematic body wakes what touches it or is joined to it, there and at its new place; a fixed
+/// one has no velocities. Result, where tandem_world_where() is the body: TANDEM_UNKNOWN_INSTANCE,
+/// TANDEM_POSE_NOT_RIGID, TANDEM_OUT_OF_RANGE. After an error nothing has changed.
 TANDEM_API tandem_status tandem_world_set_body(tandem_world* world, uint32_t body,
                                                const tandem_body_motion* motion);
+
+/// Gives a body another material, or lets another part of gravity act on it, from the next step on; see
+/// tandem_body_start. States keep both. Where that is not what it was, the body wakes, and of a fixed or
+/// kinematic body what touches it or is joined to it. Result, where tandem_world_where() is the body:
+/// TANDEM_UNKNOWN_INSTANCE, TANDEM_OUT_OF_RANGE.
+TANDEM_API tandem_status tandem_world_set_material(tandem_world* world, uint32_t body, double friction,
+                                                   double restitution, double rolling_resistance);
+TANDEM_API tandem_status tandem_world_set_gravity_scale(tandem_world* world, uint32_t body,
+                                                        double gravity_scale);
 
 /// Adds to a moving body's velocities what an impulse at a point of the world does, both x, y, z, and wakes
 /// it; others stay as they are. Result: as of tandem_world_set_body().

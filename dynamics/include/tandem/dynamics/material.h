@@ -10,6 +10,8 @@ struct Material {
   double restitution = -1;         ///< part of the speed that an impact gives back, at most 1
   double rolling_resistance = -1;  ///< lever at which the force between two bodies resists that they turn
                                    ///< against each other
+
+  friend bool operator==(const Material&, const Material&) = default;
 };
 
 }  // namespace tandem

@@ -40,6 +40,16 @@ struct WorldContact {
   double impulse[3];  ///< on b, friction included; on a the opposite one. Newton seconds
 };
 
+/// Two bodies that touch, and how hard.
+struct WorldTouch {
+  std::uint32_t a, b;  ///< a < b
+  double impulse;  ///< by which they push each other apart in a step: the sum over their contacts of those
+                   ///< along the normals. Newton seconds
+  double speed;    ///< at which they approach each other at the start of the step, the largest of their
+                   ///< contacts along its normal; 0 where they part
+  double position[3];  ///< of the contact that pushes hardest, or of the deepest where none pushes
+};
+
 /// Says how a joint lets body b move against body a.
 enum class JointKind : std::uint8_t {
   ball,      ///< turns about the anchor
@@ -62,6 +72,10 @@ struct JointDescription {
   double least = -std::numeric_limits<double>::infinity(), most = std::numeric_limits<double>::infinity();
   double speed = 0;        ///< that the motor of a hinge or slider drives b at, against a
   double most_effort = 0;  ///< its greatest torque or force; 0: there is no motor
+  /// The mean force or torque in a step beyond which it lets go at the end of the step, its motor and limits
+  /// included: about b's anchor, in newtons and newton metres.
+  double breaking_force = std::numeric_limits<double>::infinity(),
+         breaking_torque = std::numeric_limits<double>::infinity();
   bool may_touch = false;  ///< the two bodies have contacts with each other
 };
 
@@ -72,6 +86,7 @@ struct WorldJoint {
   double impulse[3];    ///< on b at its anchor, on a the opposite one, in the world. Newton seconds
   double turning[3];    ///< the same of torques. Newton metre seconds
   double motor_effort;  ///< mean torque or force of the motor in the step, along the axis on b
+  bool holds;           ///< false: it has broken, or been removed
 };
 
 struct WorldOptions {
@@ -130,17 +145,35 @@ class World {
   /// Return pairs of bodies, ascending. touching: those that touch in the last step: at its start they had a
   /// contact that is no gap, or one of their contacts pushed in it. Two bodies that sleep go on as they were.
   /// began, ended: those that came to touch, or to touch no longer, in any of the steps of the last call of
-  /// step(); a pair that bounced in the call is in both. touching() less began() have touched all along, but
-  /// for pairs that are in ended() too. Valid until the next call; restore() leaves began and ended empty.
-  std::span<const ObjectPair> touching() const;
-  std::span<const ObjectPair> began() const;
+  /// step(); a pair that bounced in the call is in both. Pairs of began have the numbers of
+  /// the step of the call, from when they began to touch, in which they pushed hardest, and the largest
+  /// speed: an impact often takes two steps, the first of which lets the bodies come as far as they meet.
+  /// touching() less began() have touched all along, but for pairs that are in ended() too. Valid until the
+  /// next call; restore() leaves began and ended empty.
+  std::span<const WorldTouch> touching() const;
+  std::span<const WorldTouch> began() const;
   std::span<const ObjectPair> ended() const;
 
-  /// What the joints did in the last step, in the order given to set_bodies(). Valid until the next call.
+  /// What the joints did in the last step, in the order given to set_bodies(), and then to add_joint(). Valid
+  /// until the next call.
   std::span<const WorldJoint> joints() const;
 
+  /// Returns the joints that broke in any of the steps of the last call of step(), ascending; see
+  /// JointDescription. A broken joint keeps its place in the list until it is removed, and its bodies may
+  /// touch from the next step on. Valid until the next call; restore() leaves it empty.
+  std::span<const std::uint32_t> broken() const;
+
+  /// Joins bodies as they are now, and wakes them. joint: its place in joints(), the first from which a joint
+  /// has been removed, or else one at the end. Result: kOk; kUnknownInstance, kBadJoint, kNoAxis,
+  /// kJoinsNothing; kOutOfMemory. After an error nothing has changed.
+  Status add_joint(const JointDescription& description, std::uint32_t& joint);
+
+  /// Removes a joint, broken or not, and wakes the bodies. Others keep their places. Result: kOk; kBadJoint
+  /// where there is none; kOutOfMemory.
+  Status remove_joint(std::uint32_t joint);
+
   /// Gives the motor of a hinge or slider another speed and greatest effort, see JointDescription, and wakes
-  /// the bodies. Result: kOk; kBadJoint.
+  /// the bodies. Result: kOk; kBadJoint, also of a joint that has broken.
   Status set_motor(std::uint32_t joint, double speed, double most_effort);
 
   /// Returns the seconds of all steps since set_bodies().
@@ -150,9 +183,16 @@ class World {
   double mass_of(std::uint32_t body) const;
 
   /// Puts a body elsewhere or gives it other velocities, and wakes it; `sleeps` and `centre` are not looked
-  /// at. Result: kOk; kUnknownInstance; kPoseNotRigid; kOutOfRange where a number is not finite or a velocity
-  /// beyond 1e10.
+  /// at. A fixed or kinematic body wakes what touches it or is joined to it, there and at its new place; a
+  /// fixed one has no velocities. Result: kOk; kUnknownInstance; kPoseNotRigid; kOutOfRange where a number is
+  /// not finite or a velocity beyond 1e10; kOutOfMemory.
   Status set(std::uint32_t body, const BodyMotion& motion);
+
+  /// Gives a body another material, or lets another part of gravity act on it, from the next step on; save()
+  /// keeps both. Where that is not what it was, the body wakes, and of a fixed or kinematic body what touches
+  /// it or is joined to it. Result: kOk; kUnknownInstance; kOutOfRange of numbers that set_bodies() refuses.
+  Status set_material(std::uint32_t body, const Material& material);
+  Status set_gravity_scale(std::uint32_t body, double gravity_scale);
 
   /// Adds to a moving body's velocities what an impulse at a point of the world does, and wakes it. Result:
   /// kOk; kUnknownInstance; kOutOfRange where a number is not finite or a velocity becomes
@@ -176,6 +216,8 @@ class World {
 
  private:
   struct Parts;
+  template <typename Change>
+  Status change(std::uint32_t body, const Change& change);
   Status fail(Status status, std::uint64_t where = 0) const;
   std::unique_ptr<Parts> parts_;
 };

@@ -99,26 +99,21 @@ ContactMeeting RowMaker::meeting(const ContactPoint& contact, const ContactPoint
 ContactRows RowMaker::rows(const ContactPoint& contact, const ContactPoint& deepest, const SteppedBody& a,
                            const SteppedBody& b, const Material& material,
                            const ContactImpulse& impulse) const {
-  const auto [first, second] = Tangents(contact.normal);
+  const Tangents across(contact.normal);
   const ContactMeeting meets = meeting(contact, deepest, material);
   const auto row = [&](const Vector3& direction) {
     return ContactRow{-gradient(a, direction, meets.arm_a), gradient(b, direction, meets.arm_b)};
   };
   const auto along = [&](const Vector3& x) {
-    return Vector3{dot(contact.normal, x), dot(first, x), dot(second, x)};
+    return Vector3{dot(contact.normal, x), dot(across.first, x), dot(across.second, x)};
   };
   const Vector3 moving = driven(contact.body_b, meets.arm_b) - driven(contact.body_a, meets.arm_a);
   const Vector3 pushed = along(impulse.tangential);
-  return {row(contact.normal),
-          row(first),
-          row(second),
-          first,
-          second,
-          along(moving),
-          meets.separation,
-          material.friction,
-          meets.rebound,
-          {impulse.normal, pushed.y, pushed.z}};
+  return {row(contact.normal), row(across.first),
+          row(across.second),  across.first,
+          across.second,       along(moving),
+          meets.separation,    material.friction,
+          meets.rebound,       {impulse.normal, pushed.y, pushed.z}};
 }
 
 double turning_mobility(const SteppedBody& a, const SteppedBody& b) {

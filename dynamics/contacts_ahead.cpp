@@ -42,7 +42,7 @@ void ContactsAhead::find_near(const BodiesAhead& of) {
   auto before = apart_.begin();
   for (const ObjectPair& pair : scene_.pairs()) {
     while (before != apart_.end() && before->pair < pair) ++before;
-    Apart& now = now_apart_.emplace_back(Apart{pair});
+    Apart& now = now_apart_.emplace_back(Apart{{pair}});
     if (before != apart_.end() && before->pair == pair)
       now.distance = before->distance - ways_.between(pair) * (1 + 1e-9);
     const double way = of.dt * (norm(approach_of(pair, of.states)) + turning_of(pair));

@@ -18,7 +18,7 @@ world = tandem.World([hook, mug], asset=[0, 1], translation=[[0, 0, 0.03], [0, -
 while not world.sleeping[1] and world.time < 30:
     world.step(1 / 240, 24)
 x, y, z = world.bodies["centre"][1]
-assert world.sleeping[1] and world.touching.tolist() == [(0, 1)] and abs(x) < 0.01 and z < -0.05
+assert world.sleeping[1] and len(world.touching) == 1 and abs(x) < 0.01 and z < -0.05
 print(f"the mug hangs by its handle, {-z:.2f} m below the hook, and rests")
 
 if "--picture" in sys.argv:

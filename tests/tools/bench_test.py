@@ -164,7 +164,7 @@ class Query(BenchTest):
         self.write_scene()
         keys = documented_keys("query", "\nWith `--")
         self.assertEqual(list(self.query()), keys[0])
-        self.assertEqual(list(self.query("--manifolds", "--contained")), keys[0] + keys[1] + keys[2])
+        self.assertEqual(list(self.query("--manifolds", "--keep", "1e-3", "--contained")), keys[0] + keys[1] + keys[2] + keys[3])
 
     def test_two_cubes_cross_where_they_should(self):
         self.write_scene()

@@ -69,24 +69,6 @@ bool ContinuousMotion::find_fast(std::span<const BodyProperties> bodies, std::sp
   return any;
 }
 
-// Returns which part of their ways two bodies go until they are a slop deep in each other, or a little beyond
-// where they barely touch. reach: how much farther they may go, a length.
-double ContinuousMotion::stop_of(const Impact& impact, const ObjectPair& pair, double reach,
-                                 double slop) const {
-  const Vector3 at_a = vector_of(impact.point_a), at_b = vector_of(impact.point_b);
-  const auto velocity = [&](std::uint32_t body, const Vector3& at) {
-    const RigidMotion& motion = motion_[body];
-    const Vector3 v = vector_of(motion.velocity), w = vector_of(motion.angular_velocity),
-                  c = vector_of(motion.centre);
-    return v + cross(w, at - (c + impact.t_safe * v));
-  };
-  const Vector3 approach = velocity(pair.a, at_a) - velocity(pair.b, at_b), apart = at_b - at_a;
-  const double closing = norm(apart) > 0 ? dot(approach, normalized(apart)) : norm(approach);
-  double beyond = reach / norm(approach);
-  if (closing > 0) beyond = std::min(beyond, (impact.gap + slop) / closing);
-  return std::min(1.0, impact.t_safe + beyond);
-}
-
 // Returns how deep two bodies are in each other when they have gone this part of their ways; infinite where
 // one goes through the other.
 double ContinuousMotion::depth_at(std::span<const BodyProperties> bodies, std::span<const BodyState> before,
@@ -109,20 +91,41 @@ double ContinuousMotion::depth_at(std::span<const BodyProperties> bodies, std::s
   return depth;
 }
 
-// Returns which part of their ways two bodies go that touch already.
+// Returns which part of their ways two bodies go until they are a slop deep in each other. What hardly closes
+// slides on, as what touches already. reach: how much farther they may go unseen, a length.
+double ContinuousMotion::stop_after(const Impact& impact, std::span<const BodyProperties> bodies,
+                                    std::span<const BodyState> before, const ObjectPair& pair, double reach,
+                                    double slop) {
+  const Vector3 at_a = vector_of(impact.point_a), at_b = vector_of(impact.point_b);
+  const auto velocity = [&](std::uint32_t body, const Vector3& at) {
+    const RigidMotion& motion = motion_[body];
+    const Vector3 v = vector_of(motion.velocity), w = vector_of(motion.angular_velocity),
+                  c = vector_of(motion.centre);
+    return v + cross(w, at - (c + impact.t_safe * v));
+  };
+  const Vector3 approach = velocity(pair.a, at_a) - velocity(pair.b, at_b), apart = at_b - at_a;
+  const double closing = norm(apart) > 0 ? dot(approach, normalized(apart)) : norm(approach);
+  const double unseen = impact.t_safe + reach / norm(approach);
+  const double deep = closing > 0 ? impact.t_safe + (impact.gap + slop) / closing : INFINITY;
+  if (deep <= unseen || unseen >= 1) return std::min({1.0, deep, unseen});
+  return stop_of_touching(bodies, before, pair, unseen, reach, slop);
+}
+
+// Returns which part of their ways two bodies go that touch when they have gone a first part.
 double ContinuousMotion::stop_of_touching(std::span<const BodyProperties> bodies,
                                           std::span<const BodyState> before, const ObjectPair& pair,
-                                          double reach, double slop) {
+                                          double first, double reach, double slop) {
   const auto turned_by = [&](std::uint32_t body) {
     return bodies[body].motion == Motion::fixed ? 0 : part_[body] * bodies[body].radius * norm(turn_[body]);
   };
   const Vector3 way = part_[pair.a] * way_[pair.a] - part_[pair.b] * way_[pair.b];
-  const double samples = std::ceil((norm(way) + turned_by(pair.a) + turned_by(pair.b)) / reach);
+  const double rest = (1 - first) * (norm(way) + turned_by(pair.a) + turned_by(pair.b));
+  const double samples = std::max(1.0, std::ceil(rest / reach)), sample = (1 - first) / samples;
   const double most = std::max(depth_at(bodies, before, pair, 0), slop) + reach;
   for (double i = 1; i <= std::min(samples, kMostSamples); ++i) {
-    if (depth_at(bodies, before, pair, i / samples) > most) return (i - 1) / samples;
+    if (depth_at(bodies, before, pair, first + i * sample) > most) return first + (i - 1) * sample;
   }
-  return std::min(1.0, kMostSamples / samples);
+  return std::min(1.0, first + kMostSamples * sample);
 }
 
 void ContinuousMotion::find_groups(std::span<const BodyProperties> bodies,
@@ -163,8 +166,8 @@ bool ContinuousMotion::stop(std::span<const BodyProperties> bodies, std::span<co
     const double thinner = std::min(inner_radius(bodies[pair.a]), inner_radius(bodies[pair.b]));
     const double reach = std::isfinite(thinner) ? kBeyond * thinner : slop;
     const double part = impact.status == ImpactStatus::found
-                            ? stop_of(impact, pair, reach, slop)
-                            : stop_of_touching(bodies, before, pair, reach, slop);
+                            ? stop_after(impact, bodies, before, pair, reach, slop)
+                            : stop_of_touching(bodies, before, pair, 0, reach, slop);
     if (part > 1 - 1e-9) continue;
     for (const std::uint32_t body : {pair.a, pair.b}) {
       if (bodies[body].motion != Motion::moving) continue;

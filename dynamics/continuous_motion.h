@@ -38,9 +38,10 @@ class ContinuousMotion {
                  std::span<const BodyState> after);
   void find_groups(std::span<const BodyProperties> bodies, std::span<const ObjectPair> joined);
   bool stop(std::span<const BodyProperties> bodies, std::span<const BodyState> before, double slop);
-  double stop_of(const Impact& impact, const ObjectPair& pair, double reach, double slop) const;
+  double stop_after(const Impact& impact, std::span<const BodyProperties> bodies,
+                    std::span<const BodyState> before, const ObjectPair& pair, double reach, double slop);
   double stop_of_touching(std::span<const BodyProperties> bodies, std::span<const BodyState> before,
-                          const ObjectPair& pair, double reach, double slop);
+                          const ObjectPair& pair, double first, double reach, double slop);
   double depth_at(std::span<const BodyProperties> bodies, std::span<const BodyState> before,
                   const ObjectPair& pair, double part);
 

@@ -475,4 +475,18 @@ TEST(World, GoesBackToWhatWasSavedAndDoesNotDependOnThreads) {
 }
 
 }  // namespace
+// A plate that stands on the ground to the last bit, or barely above it, slides by v^2 / (2 friction g).
+TEST(World, ContinuousMotionLetsPlatesSlide) {
+  constexpr double kSpeed = 8, kFriction = 0.5;
+  for (const double gap : {0.0, 1e-9, 1e-6, 1e-4}) {
+    SCOPED_TRACE(gap);
+    WorldOnGround scene(box(1, 1, 0.02));
+    scene.add(shift(0, 0, 0.01 + gap)).velocity[0] = kSpeed;
+    World& world = scene.begin({.friction = kFriction, .continuous = true});
+    EXPECT_EQ(world.step(kStep, 150), Status::kOk);
+    EXPECT_NEAR(world.bodies()[1].centre[0], kSpeed * kSpeed / (2 * kFriction * kGravity), 0.1);
+    EXPECT_NEAR(world.bodies()[1].centre[2], 0.01, 1e-3);
+  }
+}
+
 }  // namespace tandem::test

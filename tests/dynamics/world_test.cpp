@@ -480,7 +480,7 @@ TEST(World, ContinuousMotionLetsPlatesSlide) {
   constexpr double kSpeed = 8, kFriction = 0.5;
   for (const double gap : {0.0, 1e-9, 1e-6, 1e-4}) {
     SCOPED_TRACE(gap);
-    WorldOnGround scene(box(1, 1, 0.02));
+    WorldOnGround scene(box(1, 1, 0.02f));
     scene.add(shift(0, 0, 0.01 + gap)).velocity[0] = kSpeed;
     World& world = scene.begin({.friction = kFriction, .continuous = true});
     EXPECT_EQ(world.step(kStep, 150), Status::kOk);

@@ -57,19 +57,9 @@ inline bool within(float c_i, float h_i, float c_o, float h_o) {
   return sign_of_sum(distance, TwoSum(h_i, -static_cast<double>(h_o))) <= 0;
 }
 
-// Raises h until [c - h, c + h] contains [c_i - h_i, c_i + h_i]. This is the one place where boxes are
-// rounded, and they are rounded outward: the exact predicate itself says when to stop, so what it returns
-// contains the inner interval whatever the rounding of the first guess was. The guess is at most a float or
-// two away from the exact value, so the loop runs at most twice.
-float widen(float c, float h, float c_i, float h_i) {
-  const double guess = std::abs(static_cast<double>(c_i) - c) + h_i;
-  h = std::max(h, static_cast<float>(guess));
-  while (!within(c_i, h_i, c, h)) h = std::nextafter(h, std::numeric_limits<float>::infinity());
-  return h;
-}
-
-float midpoint(double lo, double hi) {
-  return static_cast<float>((lo + hi) * 0.5);
+// Halves are summed, so that nothing overflows.
+float midpoint(float lo, float hi) {
+  return 0.5f * lo + 0.5f * hi;
 }
 
 }  // namespace
@@ -79,7 +69,7 @@ Box enclose(const Position& lo, const Position& hi) {
   for (int k = 0; k < 3; ++k) {
     const float c = midpoint(lo[k], hi[k]);
     box.centre[k] = c;
-    box.half_extent[k] = widen(c, widen(c, 0, lo[k], 0), hi[k], 0);
+    box.half_extent[k] = std::max(half_extent_around(c, lo[k], 0), half_extent_around(c, hi[k], 0));
   }
   return box;
 }
@@ -89,17 +79,15 @@ Box enclose(const Block& block) {
   for (int k = 0; k < 3; ++k) {
     const float* centre = block.centre[k];
     const float* half_extent = block.half_extent[k];
-    double lo = std::numeric_limits<double>::infinity(), hi = -lo;
-    for (int i = 0; i < kNodesPerBlock;
-         ++i) {  // an imaginary node changes neither: its interval is [+inf, -inf]
-      lo = std::min(lo, static_cast<double>(centre[i]) - half_extent[i]);
-      hi = std::max(hi, static_cast<double>(centre[i]) + half_extent[i]);
+    float lo = std::numeric_limits<float>::infinity(), hi = -lo;
+    for (int i = 0; i < kNodesPerBlock; ++i) {  // an imaginary node changes neither: it is [+inf, -inf]
+      lo = std::min(lo, centre[i] - half_extent[i]);
+      hi = std::max(hi, centre[i] + half_extent[i]);
     }
     const float c = midpoint(lo, hi);
     float h = 0;
-    for (int i = 0; i < kNodesPerBlock && block.kind[i] != NodeKind::imaginary; ++i) {
-      h = widen(c, h, centre[i], half_extent[i]);
-    }
+    for (int i = 0; i < kNodesPerBlock && block.kind[i] != NodeKind::imaginary; ++i)
+      h = std::max(h, half_extent_around(c, centre[i], half_extent[i]));
     box.centre[k] = c;
     box.half_extent[k] = h;
   }

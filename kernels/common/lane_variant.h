@@ -11,6 +11,8 @@ struct NearestTask;
 struct BoundedBlockPair;
 struct NearestSoFar;
 struct ManifoldLanes;
+struct RefitTree;
+struct RefitSurfaces;
 
 /// The functions that are compiled once for each width of vectors.
 struct LaneVariant {
@@ -18,6 +20,7 @@ struct LaneVariant {
   bool (*narrow_phase)(const PairTask&, ContactSink&);
   void (*nearest_phase)(const NearestTask&, const BoundedBlockPair*, std::uint32_t, NearestSoFar&);
   const ManifoldLanes* manifold_lanes;
+  RefitSurfaces (*refit)(const RefitTree&, const float*);
 };
 
 // Each is defined in a file of kernels/variants/, which is compiled for machines that have the instructions.

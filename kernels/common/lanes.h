@@ -15,9 +15,12 @@
 #endif
 #include <cstdint>
 
-// Vectors of 4, 8 or 16 float32. Included by files that are compiled for different machines: all of it has
-// internal linkage, also what is instantiated with the types of this file, so that no function compiled for
-// one machine is linked into code for another.
+// Vectors wider than the machine's have no way to be passed, and need none: all is inlined.
+#pragma GCC diagnostic ignored "-Wpsabi"
+
+// Vectors of 4, 8 or 16 float32, and of float64. Included by files that are compiled for different machines:
+// all of it has internal linkage, also what is instantiated with the types of this file, so that no function
+// compiled for one machine is linked into code for another.
 namespace tandem {
 namespace {
 
@@ -140,7 +143,16 @@ struct Lanes {
     }
   }
   TANDEM_INLINE friend Lanes larger(const Lanes& a, const Lanes& b) {
+#if defined(__SSE2__)
+    if constexpr (kCount == 4) return {_mm_max_ps(b.v, a.v)};
+#endif
     return select(less(a, b), b, a);
+  }
+  TANDEM_INLINE friend Lanes lesser(const Lanes& a, const Lanes& b) {
+#if defined(__SSE2__)
+    if constexpr (kCount == 4) return {_mm_min_ps(b.v, a.v)};
+#endif
+    return select(less(b, a), b, a);
   }
 };
 
@@ -152,6 +164,19 @@ TANDEM_INLINE void LaneMask<16>::require(const Lanes<16>& x, const Lanes<16>& y)
 #endif
 
 using Lanes4 = Lanes<4>;
+
+template <int kCount>
+struct DoubleVector {
+  using Doubles [[gnu::vector_size(8 * kCount)]] = double;
+  using Bits [[gnu::vector_size(8 * kCount)]] = std::int64_t;
+};
+
+template <int kCount>
+using DoubleLanes = typename DoubleVector<kCount>::Doubles;
+
+/// Truth values, 0 or -1 each.
+template <int kCount>
+using DoubleMask = typename DoubleVector<kCount>::Bits;
 
 TANDEM_INLINE Lanes4 load(const float* four) {
   Lanes4 out;

@@ -6,15 +6,39 @@
 /// The two triangles of a candidate as the stages after the first take them, and the contact that they make.
 namespace tandem {
 
+/// The posed float64 points of a triangle's corners. pose: of stored coordinates; precise: the corners where
+/// they are no float32 numbers, or null.
+TANDEM_HD inline void pose_corners(const Pose& pose, const Triangle& triangle, const PreciseCorners* precise,
+                                   double (&out)[3][3]) {
+  for (int c = 0; c < 3; ++c) {
+    const float* const p = triangle.corner[c].position;
+    double x[3] = {p[0], p[1], p[2]};
+    for (int k = 0; k < 3 && precise != nullptr; ++k) x[k] = precise->position[c][k];
+    apply(pose, x[0], x[1], x[2], out[c]);
+  }
+}
+
+TANDEM_HD inline void pose_corners(const Pose& pose, const LevelView& tree, std::uint32_t triangle,
+                                   double (&out)[3][3]) {
+  pose_corners(pose, tree.triangles[triangle], tree.precise != nullptr ? &tree.precise[triangle] : nullptr,
+               out);
+}
+
 /// The posed float64 points. The poses are those of stored coordinates.
+TANDEM_HD inline TrianglePair posed_pair(const Pose& pose_a, const LevelView& tree_a, std::uint32_t a,
+                                         const Pose& pose_b, const LevelView& tree_b, std::uint32_t b) {
+  TrianglePair pair;
+  pose_corners(pose_a, tree_a, a, pair.a);
+  pose_corners(pose_b, tree_b, b, pair.b);
+  return pair;
+}
+
+/// As above, of trees whose corners are float32 numbers.
 TANDEM_HD inline TrianglePair posed_pair(const Pose& pose_a, const Triangle& a, const Pose& pose_b,
                                          const Triangle& b) {
   TrianglePair pair;
-  for (int c = 0; c < 3; ++c) {
-    const float *p = a.corner[c].position, *q = b.corner[c].position;
-    apply(pose_a, p[0], p[1], p[2], pair.a[c]);
-    apply(pose_b, q[0], q[1], q[2], pair.b[c]);
-  }
+  pose_corners(pose_a, a, nullptr, pair.a);
+  pose_corners(pose_b, b, nullptr, pair.b);
   return pair;
 }
 

@@ -134,12 +134,13 @@ PairTask pair_task(const PosedTree& a, const PosedTree& b, double within) {
 
 bool meet(const PairTask& task, std::uint32_t triangle_a, std::uint32_t triangle_b,
           ContactCounters& counters) {
-  const Triangle &a = task.a->tree.triangles[triangle_a], &b = task.b->tree.triangles[triangle_b];
+  const LevelView &a = task.a->tree, &b = task.b->tree;
   if (task.mode == QueryMode::fast && task.in_frame && !(task.within > 0)) {
     ++counters.decided_by_float32;
-    return decide_fast(framed_pair(task.b_in_a, a, b)) == Verdict::contact;
+    return decide_fast(framed_pair(task.b_in_a, a.triangles[triangle_a], b.triangles[triangle_b])) ==
+           Verdict::contact;
   }
-  const TrianglePair pair = posed_pair(task.a->pose, a, task.b->pose, b);
+  const TrianglePair pair = posed_pair(task.a->pose, a, triangle_a, task.b->pose, b, triangle_b);
   if (task.within > 0) return are_within(task, pair, counters);
   const Verdict verdict = decide_float64(pair);
   const bool exactly = verdict == Verdict::undecided;

@@ -18,7 +18,8 @@ using containment::Surface;
 // Pairs that a thread takes at a time.
 constexpr std::size_t kPairsAtOnce = 64;
 
-Surface surface_of(const FileHeader& header, const LevelView& level) {
+Surface surface_of(const SceneAsset& asset) {
+  const LevelView& level = asset.tree;
   Surface surface = {};
   surface.triangles = level.triangles;
   surface.blocks = level.blocks;
@@ -29,10 +30,10 @@ Surface surface_of(const FileHeader& header, const LevelView& level) {
   surface.closed = level.closed;
   for (std::uint32_t c = 0; c < level.component_count; ++c)
     surface.any_closed = surface.any_closed || is_closed(level.components[c]);
-  std::copy_n(header.origin, 3, surface.origin);
-  std::copy_n(header.lower, 3, surface.lower);
-  std::copy_n(header.upper, 3, surface.upper);
-  surface.farthest = farthest_of(extent_of(level.blocks[0]));
+  std::copy_n(asset.origin, 3, surface.origin);
+  std::copy_n(asset.lower, 3, surface.lower);
+  std::copy_n(asset.upper, 3, surface.upper);
+  surface.farthest = farthest_of(asset.extent);
   return surface;
 }
 
@@ -66,7 +67,7 @@ struct Found {
 }  // namespace
 
 struct ContainmentQuery::State : Allocated {
-  std::uint64_t assets_id = 0;  // whose surfaces these are
+  std::uint64_t assets_id = 0, shapes_id = 0;  // whose surfaces these are
   Buffer<Surface> surfaces;
   Buffer<std::uint32_t> labels;
   Buffer<std::uint32_t> begin;  // of each pair's contacts
@@ -79,14 +80,15 @@ struct ContainmentQuery::State : Allocated {
 };
 
 Status ContainmentQuery::State::name_surfaces(SceneState& scene) {
-  if (assets_id == scene.assets_id) return Status::kOk;
+  if (assets_id == scene.assets_id && shapes_id == scene.shapes_id) return Status::kOk;
+  if (const Status status = scene.require_float32_corners(); status != Status::kOk) return status;
+  const bool label_all = assets_id != scene.assets_id;
   assets_id = 0;
   surfaces.clear();
   std::size_t labelled = 0;
   for (std::size_t i = 0; i < scene.assets.size(); ++i) {
     const LevelView& level = scene.assets[i].tree;
-    if (!surfaces.push(surface_of(*scene.assets[i].view.header, level)))
-      return scene.fail(Status::kOutOfMemory, i);
+    if (!surfaces.push(surface_of(scene.assets[i]))) return scene.fail(Status::kOutOfMemory, i);
     if (level.component_count != 1) labelled += level.triangle_count;
   }
   if (!labels.resize(labelled)) return scene.fail(Status::kOutOfMemory, 0);
@@ -94,11 +96,12 @@ Status ContainmentQuery::State::name_surfaces(SceneState& scene) {
   for (std::size_t i = 0; i < scene.assets.size(); ++i) {
     const LevelView& level = scene.assets[i].tree;
     if (level.component_count == 1) continue;
-    if (!containment::label_triangles(level, next)) return scene.fail(Status::kOutOfMemory, i);
+    if (label_all && !containment::label_triangles(level, next)) return scene.fail(Status::kOutOfMemory, i);
     surfaces[i].labels = next;
     next += level.triangle_count;
   }
   assets_id = scene.assets_id;
+  shapes_id = scene.shapes_id;
   return Status::kOk;
 }
 

@@ -210,8 +210,8 @@ void keep_nearer(const TriangleDistance& found, std::uint32_t triangle_a, std::u
 
 void settle(const NearestTask& task, std::uint32_t triangle_a, std::uint32_t triangle_b,
             NearestSoFar& state) {
-  const TrianglePair pair = posed_pair(task.a->pose, task.a->tree.triangles[triangle_a], task.b->pose,
-                                       task.b->tree.triangles[triangle_b]);
+  const TrianglePair pair =
+      posed_pair(task.a->pose, task.a->tree, triangle_a, task.b->pose, task.b->tree, triangle_b);
   const TriangleDistance found = triangle_distance(pair, task.tolerance);
   ++state.counters.by_float64;
   state.floor = std::min(state.floor, found.interval.lower);
@@ -227,8 +227,8 @@ void settle(const NearestTask& task, std::uint32_t triangle_a, std::uint32_t tri
 void find_direction(const NearestTask& task, NearestSoFar& state) {
   if (state.has_along) return;
   state.has_along = true;
-  const TrianglePair pair = posed_pair(task.a->pose, task.a->tree.triangles[state.triangle_a], task.b->pose,
-                                       task.b->tree.triangles[state.triangle_b]);
+  const TrianglePair pair =
+      posed_pair(task.a->pose, task.a->tree, state.triangle_a, task.b->pose, task.b->tree, state.triangle_b);
   double length;
   state.along = distance::best_direction(pair, length);
   const double enough = std::min(length, nearness(task, state));
@@ -278,8 +278,8 @@ double raised_along_best(const NearestTask& task, std::uint32_t triangle_a, std:
                          double lower, NearestSoFar& state) {
   if (state.triangle_a == kNoIndex) return lower;
   const double near = nearness(task, state);
-  const TrianglePair pair = posed_pair(task.a->pose, task.a->tree.triangles[triangle_a], task.b->pose,
-                                       task.b->tree.triangles[triangle_b]);
+  const TrianglePair pair =
+      posed_pair(task.a->pose, task.a->tree, triangle_a, task.b->pose, task.b->tree, triangle_b);
   lower = std::max(lower, distance::distance_along_points(pair, state.best.point_a, state.best.point_b));
   if (!(lower < near)) return lower;
   find_direction(task, state);

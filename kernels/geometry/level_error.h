@@ -31,7 +31,7 @@ TANDEM_HD inline double posed_level_error(const LevelView& level, const float* l
   for (int k = 0; k < 3; ++k) {
     const double below = std::fabs(static_cast<double>(lower[k])),
                  above = std::fabs(static_cast<double>(upper[k]));
-    bounds.reach[k] = below < above ? above : below;
+    bounds.posed_reach[k] = below < above ? above : below;
   }
   double posing = 0;
   for (int k = 0; k < 3; ++k) posing += relative_pose_detail::posing_error(pose, bounds, k);

@@ -56,10 +56,11 @@ TANDEM_HD inline void invert(const double (&r)[3][3], double (&out)[3][3]) {
   }
 }
 
-/// Returns how far apply() may be from real arithmetic in row i, over the points of a tree.
+/// Returns how far apply() may be from real arithmetic in row i, over the points of a tree: from that of the
+/// stored points, where vertices are stored rounded (widen_for_rounding()).
 TANDEM_HD inline double posing_error(const Pose& pose, const TreeExtent& tree, int i) {
   double size = 0;
-  for (int k = 0; k < 3; ++k) size += std::fabs(pose.rotation[i][k]) * tree.reach[k];
+  for (int k = 0; k < 3; ++k) size += std::fabs(pose.rotation[i][k]) * tree.posed_reach[k];
   return kU64 * std::fabs(pose.translation[i]) + 4.01 * kU64 * size;
 }
 
@@ -138,6 +139,15 @@ TANDEM_HD inline bool store_slack(double slack, double largest, float& out) {
 }
 
 }  // namespace relative_pose_detail
+
+/// Makes room for vertices that are not those stored, but farther from them by up to `rounding` along each
+/// axis: apply() of a vertex v is then within posing_error() of the image in real arithmetic of the stored
+/// point s. By |R_i . (v - s)| <= sum |R_ik| rounding_k, and |v_k| <= reach_k + rounding_k in the bound of
+/// apply() itself, what has to be added to 4.01 u reach_k is (1 + 4.01 u) rounding_k.
+inline void widen_for_rounding(const double (&rounding)[3], TreeExtent& extent) {
+  constexpr double kFactor = (1 + 0x1p-40) * (1 / (4.01 * relative_pose_detail::kU64));
+  for (int k = 0; k < 3; ++k) extent.posed_reach[k] = extent.reach[k] + kFactor * rounding[k];
+}
 
 /// Finds where b lies relative to a, with the slack that makes the box tests conservative: if
 /// overlap_6_axes(), overlap_15_axes() or block_pair_mask() says no for a box of tree a and a box of tree b,

@@ -151,6 +151,7 @@ Impact ImpactQuery::State::impact_of(std::size_t row, const ObjectPair& pair, co
 Status ImpactQuery::answer(SceneState& scene, const std::span<const ObjectPair>* given,
                            const ImpactOptions& options) {
   Status status = check(scene, options);
+  if (status == Status::kOk) status = scene.require_float32_corners();
   if (status == Status::kOk && given != nullptr) status = scene.take_pairs(*given, pairs_);
   if (status != Status::kOk) return status;
   if (scene.device != nullptr) return scene.ask_device(options, given == nullptr, found());

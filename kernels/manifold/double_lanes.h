@@ -5,25 +5,9 @@
 #include "kernels/manifold/body.h"
 #include "tandem/formats/view.h"
 
-// Vectors wider than the machine's have no way to be passed, and need none: all is inlined.
-#pragma GCC diagnostic ignored "-Wpsabi"
-
 // Vectors of float64, with the operations of vector3.h lane by lane and in its order: the same bits.
 namespace tandem {
 namespace {
-
-template <int kCount>
-struct DoubleVector {
-  using Doubles [[gnu::vector_size(8 * kCount)]] = double;
-  using Bits [[gnu::vector_size(8 * kCount)]] = std::int64_t;
-};
-
-template <int kCount>
-using DoubleLanes = typename DoubleVector<kCount>::Doubles;
-
-/// Truth values, 0 or -1 each.
-template <int kCount>
-using DoubleMask = typename DoubleVector<kCount>::Bits;
 
 /// Bit i for lane i.
 TANDEM_INLINE unsigned bits_of_mask(const DoubleMask<2>& mask) {

@@ -69,7 +69,7 @@ struct ManifoldQuery::State : Allocated {
     Buffer<FoundPoint> points;
   };
 
-  std::uint64_t assets_id = 0;  // whose shapes these are
+  std::uint64_t assets_id = 0, shapes_id = 0;  // whose shapes these are
   Buffer<Shape> shapes;
   Buffer<std::uint32_t> begin;  // of each pair's contacts
   Buffer<Contact> grouped;
@@ -99,18 +99,23 @@ struct ManifoldQuery::State : Allocated {
 
 // The points of other assets are none of these.
 Status ManifoldQuery::State::name_shapes(SceneState& scene) {
-  if (assets_id == scene.assets_id) return Status::kOk;
+  if (assets_id == scene.assets_id && shapes_id == scene.shapes_id) return Status::kOk;
+  if (assets_id != scene.assets_id) {
+    pair_points_before.clear();
+    moved_call = 0;
+  }
   assets_id = 0;
-  pair_points_before.clear();
-  moved_call = 0;
   shapes.clear();
-  if (const Status status = scene.require_topology(); status != Status::kOk) return status;
+  Status status = scene.require_topology();
+  if (status == Status::kOk) status = scene.require_float32_corners();
+  if (status != Status::kOk) return status;
   for (std::size_t i = 0; i < scene.assets.size(); ++i) {
     const SceneAsset& asset = scene.assets[i];
-    if (!shapes.push(manifold::shape_of(*asset.view.header, asset.tree)))
+    if (!shapes.push(manifold::shape_of(asset.tree, asset.lower, asset.upper, asset.origin)))
       return scene.fail(Status::kOutOfMemory, i);
   }
   assets_id = scene.assets_id;
+  shapes_id = scene.shapes_id;
   return Status::kOk;
 }
 

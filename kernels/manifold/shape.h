@@ -12,14 +12,15 @@ inline void set_bounds(const float (&lower)[3], const float (&upper)[3], const d
   shape.diagonal = norm(to - from);
 }
 
-/// Returns what manifolds need to know of a level of an asset. Condition: it has topology.
-inline Shape shape_of(const FileHeader& header, const LevelView& level) {
+/// Returns what manifolds need to know of a level with these bounds. Condition: it has topology.
+inline Shape shape_of(const LevelView& level, const float (&lower)[3], const float (&upper)[3],
+                      const double (&origin)[3]) {
   Shape shape;
   shape.triangles = level.triangles;
   shape.topology = level.topology;
   shape.blocks = level.blocks;
   shape.oriented_blocks = level.oriented_blocks;
-  set_bounds(header.lower, header.upper, header.origin, shape);
+  set_bounds(lower, upper, origin, shape);
   shape.triangle_count = level.triangle_count;
   shape.closed = level.closed;
   return shape;

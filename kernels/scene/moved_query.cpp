@@ -31,13 +31,15 @@ std::uint64_t take_moved_calls(std::uint64_t count) {
 }
 
 struct MovedQuery::State : Allocated {
-  std::uint64_t assets_id = 0;  // whose boxes these are, and what is kept is of
-  std::uint64_t version = 0;    // of the scene in the last call
+  std::uint64_t assets_id = 0;                        // whose boxes these are, and what is kept is of
+  std::uint64_t version = 0;                          // of the scene in the last call
+  std::uint64_t shapes_id = 0, shapes_id_before = 0;  // of the assets' shapes then, and in the call before
   Buffer<AssetBox> boxes;
   Buffer<PosedBodies> posed_before;
   Buffer<PairRow> places_before;  // sorted
 
   bool box_assets(const SceneState& scene);
+  bool has_bent(const SceneAsset& asset) const { return asset.shape > shapes_id_before; }
   bool place_before();
   void decide(std::size_t from, std::size_t to, const SceneState& scene, std::span<const ObjectPair> pairs,
               const MovedOptions& options, std::uint32_t* kept_rows, PosedBodies* posed) const;
@@ -45,15 +47,19 @@ struct MovedQuery::State : Allocated {
 
 // What was found of other assets is not kept.
 bool MovedQuery::State::box_assets(const SceneState& scene) {
-  if (assets_id == scene.assets_id) return true;
-  assets_id = 0;
-  posed_before.clear();
+  if (assets_id != scene.assets_id) {
+    assets_id = 0;
+    posed_before.clear();
+  }
+  shapes_id_before = shapes_id;
+  if (assets_id == scene.assets_id && shapes_id == scene.shapes_id) return true;
   if (!boxes.resize(scene.assets.size())) return false;
   for (std::size_t i = 0; i < boxes.size(); ++i) {
     const SceneAsset& asset = scene.assets[i];
     boxes[i] = asset_box(asset.lower, asset.upper, asset.origin);
   }
   assets_id = scene.assets_id;
+  shapes_id = scene.shapes_id;
   return true;
 }
 
@@ -85,6 +91,7 @@ void MovedQuery::State::decide(std::size_t from, std::size_t to, const SceneStat
     const PairRow& place = *next++;
     const PosedBodies &before = posed_before[place.row], now = posed[i];
     if (before.a.asset != now.a.asset || before.b.asset != now.b.asset) continue;
+    if (has_bent(scene.assets[now.a.asset]) || has_bent(scene.assets[now.b.asset])) continue;
     const double tolerance =
         options.tolerance_of_pair.empty() ? options.tolerance : options.tolerance_of_pair[i];
     if (!is_kept(boxes[now.a.asset], boxes[now.b.asset], {before.a.pose, before.b.pose},

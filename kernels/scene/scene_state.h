@@ -8,6 +8,7 @@
 
 #include "kernels/common/worker_threads.h"
 #include "kernels/geometry/relative_pose.h"
+#include "kernels/refit/deformed_tree.h"
 #include "kernels/scene/near_pairs.h"
 #include "kernels/scene/scene_device.h"
 #include "tandem/kernels/broad_phase.h"
@@ -25,7 +26,11 @@ struct SceneAsset {
   double grid;  ///< grid_of() the tree
   double origin[3];
   float lower[3], upper[3];
-  double diagonal;  ///< of the bounds
+  double diagonal;                   ///< of the bounds
+  DeformedTree* deformed = nullptr;  ///< whose level `tree` is; null: as in the file
+  std::uint64_t shape = 0;           ///< another number after each deformation; 0: as in the file
+
+  bool has_float32_corners() const { return tree.precise == nullptr; }
 };
 
 /// A body as the walks of trees see it.
@@ -69,6 +74,7 @@ void add_to(Counters& sum, const Counters& part, std::initializer_list<std::uint
 struct SceneState : Allocated {
   Buffer<SceneAsset> assets;
   std::uint64_t assets_id = 0;  // a number that no other list of assets of this process has
+  std::uint64_t shapes_id = 0;  // the largest `shape` of these
 
   // By the bodies' numbers.
   Buffer<Instance> instances;
@@ -103,8 +109,15 @@ struct SceneState : Allocated {
   bool is_body(std::uint32_t i) const { return i < instances.size() && instances[i].asset != kNoIndex; }
   const SceneAsset& asset_of(std::uint32_t body) const { return assets[instances[body].asset]; }
 
+  ~SceneState() { forget_assets(); }
+
   /// Result: kOk, or kNoTopology where an asset has none.
   Status require_topology();
+
+  /// Result: kOk; or kDeformed where an asset is, or kNotFloat32 where the corners of one are no float32
+  /// numbers.
+  Status require_undeformed();
+  Status require_float32_corners();
 
   /// Counts the workers to use: as many as are allowed, but no more than find something to do.
   std::uint32_t workers_for(std::size_t things, std::size_t at_once) const {
@@ -120,6 +133,9 @@ struct SceneState : Allocated {
 
   // These functions are those of Scene.
   Status set_assets(std::span<const AssetView> views);
+  template <typename Real>
+  Status deform(std::uint32_t asset, std::span<const Real> positions);
+  void forget_assets();
   Status place(std::span<const Instance> placed, const PairFilter& filter);
   Status add(const Instance& instance, const BodyFilter& filter, std::uint32_t& body);
   Status move(std::span<const std::uint32_t> numbers, std::span<const Pose> poses);
@@ -136,6 +152,8 @@ struct SceneState : Allocated {
 
   void forget_bodies();
   bool reserve_bodies(std::size_t count);
+  void take_shape(std::uint32_t number, const float (&lower)[3], const float (&upper)[3]);
+  bool stays_in_range(std::uint32_t asset, const float (&lower)[3], const float (&upper)[3]) const;
   Status pose(std::uint32_t body, const Instance& instance);
   Status pose_all(std::span<const Instance> placed, bool some_stand);
   void note_change(std::uint32_t body);

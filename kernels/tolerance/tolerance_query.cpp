@@ -44,6 +44,7 @@ struct ToleranceQuery::State : Allocated {
 };
 
 Status ToleranceQuery::State::name_levels(SceneState& scene) {
+  if (const Status status = scene.require_undeformed(); status != Status::kOk) return status;
   if (assets_id == scene.assets_id) return Status::kOk;
   assets_id = 0;
   ranges.clear();

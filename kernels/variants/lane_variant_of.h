@@ -5,6 +5,7 @@
 #include "kernels/manifold/patch_passes_lanes.h"
 #include "kernels/manifold/patch_walk_lanes.h"
 #include "kernels/manifold/piece_lanes.h"
+#include "kernels/refit/refit_lanes.h"
 
 #ifdef TANDEM_HAVE_LANES
 namespace tandem {
@@ -32,7 +33,8 @@ constexpr ManifoldLanes kManifoldLanes = {make_pieces,        sum_pieces,   leas
 
 template <int kCount>
 constexpr LaneVariant kLaneVariantOf = {block_pair_mask_of_lanes<kCount>, narrow_phase_of_lanes<kCount>,
-                                        nearest_phase_of_lanes<kCount>, &kManifoldLanes};
+                                        nearest_phase_of_lanes<kCount>, &kManifoldLanes,
+                                        refit_of_lanes<kCount>};
 
 }  // namespace
 }  // namespace tandem

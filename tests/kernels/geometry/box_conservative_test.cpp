@@ -241,7 +241,8 @@ void expect_finite(const RelativePose& pose) {
 }
 
 TEST(RelativePose, ConvertsNothingThatFloat32CannotHold) {
-  const TreeExtent small = {{1, 1, 1}, {1, 1, 1}}, endless = {{1e300, 1, 1}, {1e300, 1, INFINITY}};
+  const TreeExtent small = {{1, 1, 1}, {1, 1, 1}, {1, 1, 1}},
+                   endless = {{1e300, 1, 1}, {1e300, 1, INFINITY}, {1e300, 1, 1}};
   for (const double huge : std::initializer_list<double>{1e39, 1e80, 1e200, 1e300, INFINITY, -1e300,
                                                          -INFINITY, static_cast<double>(NAN)}) {
     for (int entry = 0; entry < 12; ++entry) {
@@ -265,7 +266,8 @@ TEST(RelativePose, ConvertsNothingThatFloat32CannotHold) {
 }
 
 TEST(RelativePose, RefusesWhatFloat32CannotHold) {
-  const TreeExtent small = {{1, 1, 1}, {1, 1, 1}}, large = {{0x1p121, 1, 1}, {1, 1, 1}};
+  const TreeExtent small = {{1, 1, 1}, {1, 1, 1}, {1, 1, 1}},
+                   large = {{0x1p121, 1, 1}, {1, 1, 1}, {0x1p121, 1, 1}};
   Pose far = kIdentityPose, broken = kIdentityPose, scaled = kIdentityPose;
   far.translation[1] = 1e52;
   broken.rotation[2][2] = NAN;

@@ -269,7 +269,7 @@ TEST(OrientedBlocks, ContactsByConstructionAreNeverCalledApart) {
 // Translations that float32 cannot hold, of boxes that are far apart: no overflow, and apart.
 TEST(OrientedBlocks, AreApartAtAnyDistanceInRange) {
   const Box box = {{0, 0, 0}, {1, 1, 1}};
-  const TreeExtent extent = {{2, 2, 2}, {2, 2, 2}};
+  const TreeExtent extent = {{2, 2, 2}, {2, 2, 2}, {2, 2, 2}};
   RandomPoses random(3);
   for (const double t : {1e2, 1e30, 1e38, 1e45, 1e48}) {
     for (int i = 0; i < 100; ++i) {

@@ -1,5 +1,7 @@
 #pragma once
 #include <cmath>
+#include <cstdint>
+#include <cstring>
 
 #include "tandem/formats/block.h"
 
@@ -19,6 +21,30 @@ using Position = float[3];
 /// overflows: a node's box grows by at most an ulp for its centre and one for its half-extent on each of
 /// kMaxDepth levels, 2^7 * 2^104 in all, and 2^115 are spare.
 inline constexpr float kMaxCoordinate = 0x1.fffp127f;
+
+/// Returns the smallest float for which [centre - it, centre + it] contains [c - h, c + h] in real
+/// arithmetic. This is the one place where boxes are rounded, and they are rounded outward.
+///
+/// With d + e = |c - centre| and s + f = d + h exactly (Knuth's two-sum: nothing overflows by the condition,
+/// and sums of floats that are subnormal are exact), what is asked for is s + (e + f). Let g be the gap below
+/// s, which is at least d. Rounding down to d and s took at most half of a gap: e, f >= -g / 2. So where e +
+/// f is negative, s is the smallest, or the float below it where both are exactly -g / 2. Where it is
+/// positive, it is at most the gap above s, and the float above s is the smallest. Rounding keeps the sign of
+/// e + f. Condition: h >= 0, and both intervals are of boxes within +-kMaxCoordinate.
+TANDEM_HD inline float half_extent_around(float centre, float c, float h) {
+  const float x = c > centre ? c : centre, y = c > centre ? centre : c;
+  const float d = x - y, y_part = x - d, e = (x - (d + y_part)) + (y_part - y);
+  const float s = d + h, h_part = s - d, f = (d - (s - h_part)) + (h - h_part);
+  std::uint32_t bits, bits_below;
+  std::memcpy(&bits, &s, sizeof bits);
+  bits_below = bits - 1;
+  float below;  // NaN where s is 0, and so are e and f
+  std::memcpy(&below, &bits_below, sizeof below);
+  bits += static_cast<std::uint32_t>(e + f > 0) - static_cast<std::uint32_t>(e == f && e + f == below - s);
+  float out;
+  std::memcpy(&out, &bits, sizeof out);
+  return out;
+}
 
 /// The box around the rounded midpoint that contains lo and hi exactly, with the smallest half-extents that
 /// do. Condition: lo[k] <= hi[k], magnitudes at most kMaxCoordinate. Then the result is finite.
@@ -48,6 +74,9 @@ TANDEM_HD inline Box box_of(const Block& block, int node) {
 struct TreeExtent {
   double reach[3];        ///< >= |centre| + half_extent
   double half_extent[3];  ///< >= half_extent
+  /// The reach that says how far posing rounds a vertex: the same, but where the vertices are float64 numbers
+  /// that triangles hold rounded (widen_for_rounding()).
+  double posed_reach[3];
 };
 
 /// The extent of the tree with this root block.
@@ -62,6 +91,7 @@ TANDEM_HD inline TreeExtent extent_of(const Block& root) {
       if (reach > extent.reach[k]) extent.reach[k] = reach;
       if (h > extent.half_extent[k]) extent.half_extent[k] = h;
     }
+    extent.posed_reach[k] = extent.reach[k];
   }
   return extent;
 }

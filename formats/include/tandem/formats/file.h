@@ -31,7 +31,8 @@ struct FileHeader {
   std::uint64_t source_faces;  ///< faces of the source file, before triangulation and cleaning
   double rounding_error;       ///< largest |stored + origin - source| of a coordinate
   std::uint32_t section_count, level_count;
-  std::uint8_t reserved[24];  ///< zero
+  std::uint64_t source_vertices;  ///< vertices of the source, as section source_vertices counts them; or 0
+  std::uint8_t reserved[16];      ///< zero
 };
 static_assert(sizeof(FileHeader) == 128 && offsetof(FileHeader, byte_order) == 16 &&
               offsetof(FileHeader, origin) == 32 && offsetof(FileHeader, lower) == 56 &&

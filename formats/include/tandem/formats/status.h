@@ -87,6 +87,12 @@ enum class [[nodiscard]] Status : std::uint32_t{
     kBadJoint,        ///< a joint that there is not, or with numbers that its kind cannot have
     kNoAxis,          ///< the axis of a hinge or slider has no direction
     kJoinsNothing,    ///< a joint of a body with itself, or of two that nothing moves
+    // These are of assets that deform.
+    kNoSourceVertices,     ///< the file does not say which vertices its triangles have, so they cannot follow
+                           ///< them
+    kVertexCountMismatch,  ///< not as many positions as the asset has source vertices
+    kDeformed,             ///< the question is not offered for deformed assets
+    kNotFloat32,           ///< the question is not offered where positions are no float32 numbers
     // These are of a GPU; status_of() of gpu_status.h names CUDA's errors.
     kNoGpu = 300,      ///< none here, none that this process may use, or no driver
     kDriverTooOld,     ///< for the CUDA version that the program was built with

@@ -9,6 +9,11 @@
 
 namespace tandem {
 
+/// The corners of a triangle as the float64 numbers that they are, where Triangle holds them rounded.
+struct PreciseCorners {
+  double position[3][3];
+};
+
 /// Looks at one level of detail of an asset; owns nothing. Its pointers are of the CPU or of the GPU.
 struct LevelView {
   const Block* blocks = nullptr;                   ///< block 0 is the root; the others follow depth first
@@ -16,6 +21,9 @@ struct LevelView {
   const OrientedBlock* oriented_blocks = nullptr;  ///< block_count of them, or null: the file has none
   const TriangleTopology* topology = nullptr;      ///< triangle_count of them, or null: the file has none
   const SurfaceComponent* components = nullptr;    ///< component_count of them; null where topology is
+  const std::uint32_t* source_vertices = nullptr;  ///< of each vertex; null: the tree cannot be refitted
+  const std::uint32_t* block_order = nullptr;  ///< the block of each oriented block; null: as above, or none
+  const PreciseCorners* precise = nullptr;     ///< of each triangle of a deformed tree; null: as stored
   std::uint32_t block_count = 0;
   std::uint32_t triangle_count = 0;
   std::uint32_t leaf_block_count = 0;

@@ -63,6 +63,29 @@ class Scene {
   /// and where() is its place in the list; or kOutOfMemory. After an error there are no assets.
   Status set_assets(std::span<const AssetView> assets);
 
+  /// Gives the vertices of an asset other positions, as often as the caller likes: all its bodies take the
+  /// shape of the triangles between these. (A body that bends alone gets an entry of its own in the list of
+  /// assets, where a view may stand several times.) Questions are then about these positions, posed as usual,
+  /// and all that are offered decide as exactly as for rigid bodies: all but ToleranceQuery (kDeformed), and,
+  /// where some coordinate is no float32 number, but those about manifolds, containment and impacts
+  /// (kNotFloat32). The other levels that the view shows are not looked at.
+  ///
+  /// positions: x, y, z of each source vertex, in the file's coordinates: as many as
+  /// FileHeader::source_vertices, in the order of the vertices that the asset was built from. They are
+  /// copied. Takes time and, the first time, memory in proportion to the triangles, and checks the bodies'
+  /// poses as place() does. Result: kOk; kUnknownAsset; kNoSourceVertices, where the file has none
+  /// (FORMAT.md); kVertexCountMismatch; kOutOfRange, where where() is the first vertex with a coordinate that
+  /// is NaN or beyond kMaxCoordinate, or the number of vertices where a body then reaches beyond
+  /// kLargestWorldCoordinate; or kOutOfMemory. After an error nothing has changed.
+  Status deform(std::uint32_t asset, std::span<const float> positions);
+  Status deform(std::uint32_t asset, std::span<const double> positions);
+
+  /// Says how much looser the tree of a deformed asset is than as it was built: its inner boxes' surface by
+  /// that of its leaves' boxes, divided by the same of the file's tree. Queries cost about so much more.
+  /// Above 1.5 or 2 a new tree (tandem::build()) of the positions pays soon. 1 where the asset is not
+  /// deformed.
+  double looseness(std::uint32_t asset) const;
+
   /// Places all bodies anew; those that stand as before cost next to nothing. The scene copies the arrays of
   /// the filter, each of which has an entry for each body; the table of excluded pairs must stay until the
   /// scene is given another filter. Pairs of two fixed bodies are not looked at, and a tree of the fixed

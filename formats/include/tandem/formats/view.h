@@ -16,12 +16,14 @@ struct LevelView {
   const OrientedBlock* oriented_blocks = nullptr;  ///< block_count of them, or null: the file has none
   const TriangleTopology* topology = nullptr;      ///< triangle_count of them, or null: the file has none
   const SurfaceComponent* components = nullptr;    ///< component_count of them; null where topology is
+  const std::uint32_t* source_vertices = nullptr;  ///< of each vertex; null: the level cannot be refitted
+  const std::uint32_t* block_order = nullptr;  ///< block of each oriented block; null without either of both
   std::uint32_t block_count = 0;
   std::uint32_t triangle_count = 0;
   std::uint32_t leaf_block_count = 0;
   std::uint32_t depth = 0;
   std::uint32_t component_count = 0;
-  std::uint32_t vertex_count = 0;  ///< different positions of corners; 0 where there is no topology
+  std::uint32_t vertex_count = 0;  ///< of the topology; 0 where there is none
   bool closed = false;             ///< all components are; false where there is no topology
   std::uint32_t number = 0;        ///< of the file's levels; 0 is the finest
   double error_bound = 0;          ///< of the distance from the file's level 0, in stored coordinates

@@ -7,7 +7,7 @@ from fractions import Fraction
 import numpy as np
 
 MAGIC = b"\x89BVH\r\n\x1a\n"
-HEADER = struct.Struct("<8sQIHHQ3d3f3fQdII24s")
+HEADER = struct.Struct("<8sQIHHQ3d3f3fQdIIQ16s")
 SECTION = struct.Struct("<IIQQQ")
 LEVEL = np.dtype([("triangles", "<u4"), ("blocks", "<u4"), ("leaf_blocks", "<u4"), ("depth", "<u4"),
                   ("error_bound", "<f8"), ("vertices", "<u4"), ("flags", "<u4")])
@@ -21,8 +21,9 @@ TOPOLOGY = np.dtype([("vertex", "<u4", 3), ("flags", "<u4")])
 COMPONENT = np.dtype([("first_triangle", "<u4"), ("triangles", "<u4"), ("flags", "<u4"), ("reserved", "<u4")])
 KINDS = {1: ("levels", LEVEL), 2: ("blocks", BLOCK), 3: ("triangles", TRIANGLE), 4: ("parts", PART),
          5: ("strings", np.dtype("u1")), 6: ("provenance", np.dtype("u1")), 7: ("oriented_blocks", ORIENTED_BLOCK),
-         8: ("topology", TOPOLOGY), 9: ("components", COMPONENT)}
-OF_A_LEVEL = ("blocks", "triangles", "oriented_blocks", "topology", "components")
+         8: ("topology", TOPOLOGY), 9: ("components", COMPONENT),
+         10: ("source_vertices", np.dtype("<u4")), 11: ("block_order", np.dtype("<u4"))}
+OF_A_LEVEL = ("blocks", "triangles", "oriented_blocks", "topology", "components", "source_vertices", "block_order")
 INTERNAL, LEAF, IMAGINARY = 0, 1, 2
 NO_INDEX = 0xFFFFFFFF
 LEAF_BLOCK = 1 << 31
@@ -49,6 +50,9 @@ class BvhFile:
     oriented_blocks: np.ndarray | None
     topology: np.ndarray | None
     components: np.ndarray | None
+    source_vertex_count: int
+    source_vertices: np.ndarray | None
+    block_order: np.ndarray | None
     parts: list
     provenance: dict
 
@@ -79,9 +83,9 @@ def read(path, level=0):
 def parse(raw, wanted=0):
     (magic, content_hash, order, major, minor, size, ox, oy, oz, *rest) = HEADER.unpack_from(raw)
     lower, upper = rest[0:3], rest[3:6]
-    source_faces, rounding_error, section_count, level_count, reserved = rest[6:]
+    source_faces, rounding_error, section_count, level_count, source_vertex_count, reserved = rest[6:]
     assert magic == MAGIC and order == 0x01020304 and (major, minor) == (1, 0)
-    assert size == len(raw) and reserved == bytes(24) and wanted < level_count <= 32
+    assert size == len(raw) and reserved == bytes(16) and wanted < level_count <= 32
     found = {}
     end = HEADER.size + section_count * SECTION.size
     for i in range(section_count):
@@ -105,7 +109,8 @@ def parse(raw, wanted=0):
     assert len(found["levels"]) == level_count
     return BvhFile(raw, wanted, content_hash, np.array([ox, oy, oz]), np.array(lower, np.float32), np.array(upper, np.float32),
                    source_faces, rounding_error, found["levels"], found["blocks"], found["triangles"],
-                   found.get("oriented_blocks"), found.get("topology"), found.get("components"), parts,
+                   found.get("oriented_blocks"), found.get("topology"), found.get("components"), source_vertex_count,
+                   found.get("source_vertices"), found.get("block_order"), parts,
                    json.loads(found["provenance"].tobytes()))
 
 
@@ -296,6 +301,8 @@ def defects_of_oriented_blocks(file):
             first = begin
     if next_number != len(file.oriented_blocks):
         defects.append("there are other oriented blocks than blocks")
+    if file.block_order is not None and {block: at for at, block in enumerate(file.block_order.tolist())} != number:
+        defects.append("the block order is not that of the oriented blocks")
     return defects
 
 
@@ -322,8 +329,12 @@ def _groups(count, pairs):
 
 def defects_of_topology(file):
     """Sentences about everything that is wrong with the topology, but for which side is outside."""
-    defects, n = [], len(file.triangles)
-    vertex = _numbered(file.corners.reshape(-1, 3) + np.float32(0)).reshape(n, 3)
+    defects, n = _defects_of_source_vertices(file), len(file.triangles)
+    places = file.corners.reshape(-1, 3) + np.float32(0)
+    if file.source_vertices is not None:  # tells vertices at one position apart
+        apart = file.source_vertices[file.topology["vertex"].ravel()]
+        places = np.column_stack([places.astype(np.float64), apart])
+    vertex = _numbered(places).reshape(n, 3)
     if (file.topology["vertex"] != vertex).any():
         defects.append("vertices are not the positions, numbered as they appear")
     if file.levels[file.level]["vertices"] != vertex.max() + 1:
@@ -355,6 +366,14 @@ def defects_of_topology(file):
     if (2 * np.bincount(component, turned, n)[first] > count)[~closed].any():
         defects.append("more than half of an open component is turned")
     return defects + _defects_of_windings(n, turned, side, edge, sides, up)
+
+
+def _defects_of_source_vertices(file):
+    if file.source_vertices is None:
+        return []
+    source = file.source_vertices
+    sound = len(source) == file.levels[file.level]["vertices"] and source.max() < file.source_vertex_count
+    return [] if sound and len(np.unique(source)) == len(source) else ["source vertices are in range, each once"]
 
 
 def _defects_of_windings(n, turned, side, edge, sides, up):

@@ -37,6 +37,7 @@ Status check_header(const FileHeader& header) {
   sound = sound && header.level_count >= 1 && header.level_count <= kMaxLevels &&
           header.section_count <= kMaxSections;
   sound = sound && header.source_faces >= 1 && header.source_faces < kNoIndex;
+  sound = sound && header.source_vertices <= kNoIndex;
   sound = sound && std::isfinite(header.rounding_error) && header.rounding_error >= 0;
   for (int k = 0; k < 3; ++k) sound = sound && std::isfinite(header.origin[k]);
   if (!sound) return Status::kBadHeader;
@@ -60,6 +61,8 @@ constexpr SectionRule kSectionRules[] = {
     {SectionKind::oriented_blocks, sizeof(OrientedBlock), true},
     {SectionKind::topology, sizeof(TriangleTopology), true},
     {SectionKind::components, sizeof(SurfaceComponent), true},
+    {SectionKind::source_vertices, sizeof(std::uint32_t), true},
+    {SectionKind::block_order, sizeof(std::uint32_t), true},
 };
 
 Status check_section(const Section& section, const FileHeader& header) {
@@ -130,10 +133,20 @@ bool has_sound_topology(const Level& level, std::span<const TriangleTopology> to
          level.vertex_count <= 3 * topology.size() && level.flags <= kClosedLevel;
 }
 
+// Returns whether a level has the sections that refitting needs, of the right sizes, or none of them.
+bool has_sound_refit(const Level& level, std::span<const std::uint32_t> source_vertices,
+                     std::span<const std::uint32_t> block_order, bool has_oriented_blocks) {
+  if (source_vertices.data() == nullptr) return block_order.data() == nullptr;
+  return level.vertex_count >= 1 && source_vertices.size() == level.vertex_count &&
+         (block_order.data() != nullptr) == has_oriented_blocks &&
+         (!has_oriented_blocks || block_order.size() == level.block_count);
+}
+
 CheckResult check_levels(const unsigned char* data, const FileHeader& header,
                          std::span<const Section> sections, std::span<const Level> levels) {
   if (levels.empty()) return {Status::kSectionMissing, 0, {}};
   if (levels.size() != header.level_count) return {Status::kBadLevel, 0, {}};
+  bool names_source_vertices = false;
   for (std::uint32_t i = 0; i < levels.size(); ++i) {
     const Level& level = levels[i];
     const auto blocks = elements<Block>(data, sections, SectionKind::blocks, i);
@@ -141,6 +154,9 @@ CheckResult check_levels(const unsigned char* data, const FileHeader& header,
     const auto oriented = elements<OrientedBlock>(data, sections, SectionKind::oriented_blocks, i);
     const auto topology = elements<TriangleTopology>(data, sections, SectionKind::topology, i);
     const auto components = elements<SurfaceComponent>(data, sections, SectionKind::components, i);
+    const auto sources = elements<std::uint32_t>(data, sections, SectionKind::source_vertices, i);
+    const auto order = elements<std::uint32_t>(data, sections, SectionKind::block_order, i);
+    names_source_vertices = names_source_vertices || sources.data() != nullptr;
     if (blocks.empty() || triangles.empty()) return {Status::kSectionMissing, i, {}};
     const double least_error = i == 0 ? 0 : levels[i - 1].error_bound;
     bool sound = blocks.size() == level.block_count && triangles.size() == level.triangle_count;
@@ -148,10 +164,12 @@ CheckResult check_levels(const unsigned char* data, const FileHeader& header,
     sound = sound && (oriented.data() == nullptr ||
                       (oriented.size() == blocks.size() && triangles.size() < kMostOrientedTriangles));
     sound = sound && has_sound_topology(level, topology, components);
+    sound = sound && has_sound_refit(level, sources, order, oriented.data() != nullptr);
     sound = sound && std::isfinite(level.error_bound) && level.error_bound >= least_error;
     sound = sound && (i > 0 || level.error_bound == 0);
     if (!sound) return {Status::kBadLevel, i, {}};
   }
+  if (names_source_vertices != (header.source_vertices > 0)) return {Status::kBadHeader, 0, {}};
   return {};
 }
 
@@ -234,7 +252,7 @@ CheckResult check(const void* data_pointer, std::size_t bytes, CheckDepth depth)
     if (step.status == Status::kOk && level.oriented_blocks != nullptr)
       step = check_oriented_blocks(level, depth);
     if (step.status == Status::kOk && level.topology != nullptr)
-      step = check_topology(level, depth, header.hash);
+      step = check_topology(level, depth, header.source_vertices, header.hash);
   }
   if (step.status == Status::kOk) step = check_bounds(asset);
   return step.status == Status::kOk ? result : step;

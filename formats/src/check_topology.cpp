@@ -38,12 +38,14 @@ bool same_position(const float* p, const float* q) {
   return p[0] == q[0] && p[1] == q[1] && p[2] == q[2];
 }
 
+std::uint64_t hash(std::uint32_t number, std::uint64_t seed) {
+  seed = (seed ^ number) * 0x9e3779b97f4a7c15u;
+  return seed ^ seed >> 32;
+}
+
 // Returns a number that is the same for the same positions; -0 counts as 0.
 std::uint64_t hash(const float* position, std::uint64_t seed) {
-  for (int k = 0; k < 3; ++k) {
-    seed = (seed ^ std::bit_cast<std::uint32_t>(position[k] + 0.0f)) * 0x9e3779b97f4a7c15u;
-    seed ^= seed >> 32;
-  }
+  for (int k = 0; k < 3; ++k) seed = hash(std::bit_cast<std::uint32_t>(position[k] + 0.0f), seed);
   return seed;
 }
 
@@ -114,11 +116,12 @@ class TopologyCheck {
  public:
   explicit TopologyCheck(const LevelView& level) : level_(level) {}
 
-  CheckResult run(CheckDepth depth, std::uint64_t seed) {
+  CheckResult run(CheckDepth depth, std::uint64_t source_vertices, std::uint64_t seed) {
     Status status = check_ranges();
+    if (status == Status::kOk) status = check_sources(source_vertices);
     if (depth == CheckDepth::full) {
       if (status == Status::kOk) status = check_vertices();
-      if (status == Status::kOk) status = check_positions(seed);
+      if (status == Status::kOk) status = check_different(seed);
       if (status == Status::kOk) status = check_edges();
       if (status == Status::kOk) status = check_components();
       if (status == Status::kOk && one_way_edges_) status = check_patches();
@@ -149,6 +152,14 @@ class TopologyCheck {
     return Status::kOk;
   }
 
+  Status check_sources(std::uint64_t source_vertices) {
+    if (level_.source_vertices == nullptr) return Status::kOk;
+    for (where_ = 0; where_ < level_.vertex_count; ++where_) {
+      if (level_.source_vertices[where_] >= source_vertices) return Status::kSourceVertexMismatch;
+    }
+    return Status::kOk;
+  }
+
   const float* position(std::uint32_t side) const {
     return level_.triangles[side / 3].corner[side % 3].position;
   }
@@ -170,17 +181,31 @@ class TopologyCheck {
     return next == level_.vertex_count ? Status::kOk : Status::kVertexOrder;
   }
 
-  // That no two vertices have the same position: each is looked for in a table of those before it.
-  Status check_positions(std::uint64_t seed) {
+  // That no two vertices have the same source vertex, or, where there are none, the same position.
+  Status check_different(std::uint64_t seed) {
+    const std::uint32_t* source = level_.source_vertices;
+    if (source == nullptr) {
+      const auto at = [&](std::uint32_t v) { return position(first_[v]); };
+      return check_different(
+          Status::kVertexMismatch, [&](std::uint32_t v) { return hash(at(v), seed); },
+          [&](std::uint32_t v, std::uint32_t w) { return same_position(at(v), at(w)); });
+    }
+    return check_different(
+        Status::kSourceVertexMismatch, [&](std::uint32_t v) { return hash(source[v], seed); },
+        [&](std::uint32_t v, std::uint32_t w) { return source[v] == source[w]; });
+  }
+
+  // Looks for each vertex in a table of those before it.
+  template <typename Hash, typename Same>
+  Status check_different(Status defect, const Hash& hash_of, const Same& same) {
     const std::size_t slots = std::bit_ceil(std::size_t{level_.vertex_count} + level_.vertex_count / 2);
     const Array<std::uint32_t> vertex_at = zeros<std::uint32_t>(slots);  // plus one
     if (vertex_at == nullptr) return Status::kOutOfMemory;
     for (std::uint32_t v = 0; v < level_.vertex_count; ++v) {
-      const float* p = position(first_[v]);
-      std::size_t slot = hash(p, seed) & (slots - 1);
+      std::size_t slot = hash_of(v) & (slots - 1);
       for (; vertex_at[slot] != 0; slot = (slot + 1) & (slots - 1)) {
-        where_ = first_[v] / 3;
-        if (same_position(position(first_[vertex_at[slot] - 1]), p)) return Status::kVertexMismatch;
+        where_ = defect == Status::kVertexMismatch ? first_[v] / 3 : v;
+        if (same(vertex_at[slot] - 1, v)) return defect;
       }
       vertex_at[slot] = v + 1;
     }
@@ -396,8 +421,9 @@ class TopologyCheck {
 
 }  // namespace
 
-CheckResult check_topology(const LevelView& level, CheckDepth depth, std::uint64_t seed) {
-  return TopologyCheck(level).run(depth, seed);
+CheckResult check_topology(const LevelView& level, CheckDepth depth, std::uint64_t source_vertices,
+                           std::uint64_t seed) {
+  return TopologyCheck(level).run(depth, source_vertices, seed);
 }
 
 }  // namespace tandem

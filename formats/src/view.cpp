@@ -21,6 +21,10 @@ LevelView AssetView::level(std::uint32_t i) const {
       view.components = reinterpret_cast<const SurfaceComponent*>(base + section.offset);
       view.component_count = static_cast<std::uint32_t>(section.count);
     }
+    if (section.kind == SectionKind::source_vertices)
+      view.source_vertices = reinterpret_cast<const std::uint32_t*>(base + section.offset);
+    if (section.kind == SectionKind::block_order)
+      view.block_order = reinterpret_cast<const std::uint32_t*>(base + section.offset);
   }
   const Level& level = levels[i];
   view.block_count = level.block_count;

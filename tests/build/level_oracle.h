@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdint>
 #include <map>
+#include <set>
 #include <vector>
 
 #include "tandem/formats/view.h"
@@ -66,11 +67,18 @@ std::vector<std::uint32_t> groups(const LevelView& level, const Edges& edges, co
 }
 
 inline const char* defect_of_vertices(const LevelView& level) {
-  std::map<std::array<float, 3>, std::uint32_t> at;
+  std::map<std::array<float, 4>, std::uint32_t> at;
+  std::set<std::uint32_t> sources;
+  if (level.source_vertices != nullptr)
+    sources.insert(level.source_vertices, level.source_vertices + level.vertex_count);
+  const bool apart = level.source_vertices != nullptr;  // vertices at one position may differ
+  if (apart && sources.size() != level.vertex_count) return "no two vertices have one source vertex";
   for (std::uint32_t side = 0; side < 3 * level.triangle_count; ++side) {
     const float* p = level.triangles[side / 3].corner[side % 3].position;
     const auto number = static_cast<std::uint32_t>(at.size());
-    if (at.try_emplace({p[0], p[1], p[2]}, number).first->second != level.topology[side / 3].vertex[side % 3])
+    const std::uint32_t vertex = level.topology[side / 3].vertex[side % 3];
+    if (at.try_emplace({p[0], p[1], p[2], apart ? static_cast<float>(vertex) : 0}, number).first->second !=
+        vertex)
       return "vertices are the positions, numbered as they appear";
   }
   return at.size() == level.vertex_count ? nullptr : "the level says how many vertices there are";
@@ -282,6 +290,9 @@ inline const char* defect_of_oriented_blocks(const LevelView& level) {
       if (!holds(level, oriented, i, leaf ? below : first[below], leaf ? below + 1 : end[below]))
         return "oriented boxes hold the triangles below them";
     }
+  }
+  for (std::uint32_t b = 0; b < level.block_count && level.block_order != nullptr; ++b) {
+    if (level.block_order[number[b]] != b) return "the block order names the block of each oriented block";
   }
   return next == level.block_count ? nullptr : "there are as many oriented blocks as blocks";
 }

@@ -33,9 +33,10 @@ build::Image make_file(const Mesh& mesh, build::Imaginary imaginary, build::Effo
 }
 
 build::Image assembled(std::span<const build::AssetLevel> levels, std::size_t faces,
-                       std::span<const build::SourcePart> parts) {
+                       std::span<const build::SourcePart> parts, std::size_t vertices) {
   build::AssetSource source;
   source.source_faces = faces;
+  source.source_vertices = vertices;
   source.parts = parts;
   source.provenance = "{\"tool\":\"test\"}";
   return build::assemble(source, levels);
@@ -47,19 +48,29 @@ static std::vector<std::uint32_t> numbers(std::size_t count) {
   return out;
 }
 
-build::Image make_file(const Mesh& mesh, const build::Tree& tree, build::Effort effort) {
+static build::Image make_file(const Mesh& mesh, const build::Tree& tree, build::Effort effort,
+                              std::span<const std::uint32_t> source_vertex) {
   const std::size_t n = mesh.triangles.size();
   const std::vector<std::uint32_t> face = numbers(n);
   const build::SourcePart parts[] = {{"left", "scene/left", 0, n / 2}, {"right", "", n / 2, n - n / 2}};
   const auto oriented_blocks = build::orient_blocks(mesh.geometry(), tree, effort);
   const build::SurfaceTopology topology = build::make_topology(mesh.geometry(), tree);
-  const build::AssetLevel level{mesh.geometry(), face, &tree, oriented_blocks, 0, &topology};
-  return assembled({&level, 1}, n, parts);
+  const build::AssetLevel level{mesh.geometry(), face, &tree, oriented_blocks, 0, &topology, source_vertex};
+  return assembled({&level, 1}, n, parts, source_vertex.size());
+}
+
+build::Image make_file(const Mesh& mesh, const build::Tree& tree, build::Effort effort) {
+  return make_file(mesh, tree, effort, {});
+}
+
+build::Image make_refittable_file(const Mesh& mesh) {
+  return make_file(mesh, build::build_tree(mesh.geometry()), build::Effort::standard,
+                   numbers(mesh.points.size()));
 }
 
 build::Image make_file_of_levels(std::span<const Mesh> meshes) {
   const std::size_t faces = meshes[0].triangles.size();
-  const std::vector<std::uint32_t> face = numbers(faces);
+  const std::vector<std::uint32_t> face = numbers(faces), vertex = numbers(meshes[0].points.size());
   struct Built {
     build::Tree tree;
     std::vector<OrientedBlock> oriented_blocks;
@@ -75,9 +86,10 @@ build::Image make_file_of_levels(std::span<const Mesh> meshes) {
   std::vector<build::AssetLevel> levels;
   for (std::size_t i = 0; i < meshes.size(); ++i)
     levels.push_back({meshes[i].geometry(), face, &built[i].tree, built[i].oriented_blocks,
-                      static_cast<double>(i), &built[i].topology});
+                      static_cast<double>(i), &built[i].topology,
+                      std::span(vertex).first(meshes[i].points.size())});
   const build::SourcePart part = {"all", "", 0, faces};
-  return assembled(levels, faces, {&part, 1});
+  return assembled(levels, faces, {&part, 1}, vertex.size());
 }
 
 std::vector<Mesh> random_levels(std::uint32_t triangles, std::uint32_t levels, std::uint64_t seed) {

@@ -27,12 +27,14 @@ Mesh random_mesh(std::uint32_t triangles, std::uint64_t seed);
 /// The bytes of a whole file over this mesh: source face i is triangle i, in two parts.
 build::Image make_file(const Mesh& mesh, build::Imaginary imaginary = build::Imaginary::minimal,
                        build::Effort effort = build::Effort::standard);
+/// The same file, with what refitting needs: source vertex i is point i of the mesh.
+build::Image make_refittable_file(const Mesh& mesh);
 build::Image make_file(const Mesh& mesh, const build::Tree& tree,
                        build::Effort effort = build::Effort::standard);
 
-/// The bytes of a file of these levels, whose source has so many faces.
+/// The bytes of a file of these levels, whose source has so many faces and vertices.
 build::Image assembled(std::span<const build::AssetLevel> levels, std::size_t faces,
-                       std::span<const build::SourcePart> parts);
+                       std::span<const build::SourcePart> parts, std::size_t vertices = 0);
 
 /// A file of several levels, each with all sections that a level can have; level i has the error bound i.
 /// Conditions: the first mesh has at least as many triangles as each of the others, and its bounds hold them.
@@ -72,6 +74,8 @@ class Bytes {
   Block* blocks() { return elements<Block>(SectionKind::blocks); }
   OrientedBlock* oriented_blocks() { return elements<OrientedBlock>(SectionKind::oriented_blocks); }
   TriangleTopology* topology() { return elements<TriangleTopology>(SectionKind::topology); }
+  std::uint32_t* source_vertices() { return elements<std::uint32_t>(SectionKind::source_vertices); }
+  std::uint32_t* block_order() { return elements<std::uint32_t>(SectionKind::block_order); }
   SurfaceComponent* components() { return elements<SurfaceComponent>(SectionKind::components); }
   Triangle* triangles() { return elements<Triangle>(SectionKind::triangles); }
   Part* parts() { return elements<Part>(SectionKind::parts); }

@@ -109,6 +109,8 @@ void examine(const CheckResult& result) {
     const char* defect = level.oriented_blocks != nullptr ? test::defect_of_oriented_blocks(level) : nullptr;
     if (defect == nullptr && level.topology != nullptr) defect = test::defect_of_topology(level);
     demand(defect == nullptr, defect);
+    for (std::uint32_t v = 0; v < level.vertex_count && level.source_vertices != nullptr; ++v)
+      demand(level.source_vertices[v] < asset.header->source_vertices, "source vertices are in range");
   }
   for (const Part& part : asset.parts) {
     read_text(asset.name_of(part));
@@ -121,7 +123,8 @@ void examine(const CheckResult& result) {
 bool is_believed(Status status) {
   return status == Status::kTriangleOutsideOrientedBox || status == Status::kVertexOrder ||
          status == Status::kVertexMismatch || status == Status::kEdgeMismatch ||
-         status == Status::kBadWinding || status == Status::kComponentMismatch;
+         status == Status::kBadWinding || status == Status::kComponentMismatch ||
+         status == Status::kSourceVertexMismatch;
 }
 
 // A full check proves no less than a quick one.

@@ -25,6 +25,7 @@ inline build::Image made_image(std::span<const MadeLevel> levels, bool oriented 
   std::vector<std::vector<OrientedBlock>> blocks(levels.size());
   std::vector<std::vector<std::uint32_t>> faces(levels.size());
   std::vector<build::SurfaceTopology> topology(levels.size());
+  std::vector<std::vector<std::uint32_t>> vertices(levels.size());
   std::vector<build::AssetLevel> rows;
   build::AssetSource source;
   for (std::size_t i = 0; i < levels.size(); ++i) {
@@ -37,6 +38,10 @@ inline build::Image made_image(std::span<const MadeLevel> levels, bool oriented 
     if (!with_topology) continue;
     topology[i] = build::make_topology(mesh.geometry(), tree);
     rows.back().topology = &topology[i];
+    vertices[i].resize(mesh.points.size());
+    std::iota(vertices[i].begin(), vertices[i].end(), 0u);
+    rows.back().source_vertex = vertices[i];
+    source.source_vertices = std::max<std::uint64_t>(source.source_vertices, vertices[i].size());
   }
   const build::SourcePart part = {"all", "", 0, source.source_faces};
   source.parts = {&part, 1};

@@ -40,9 +40,13 @@ void expect_same(const LevelView& host, const LevelView& device, Contents conten
   if (contents == Contents::exact_queries) {
     EXPECT_EQ(device.topology, nullptr);
     EXPECT_EQ(device.components, nullptr);
+    EXPECT_EQ(device.source_vertices, nullptr);
+    EXPECT_EQ(device.block_order, nullptr);
   } else {
     expect_same_array(host.topology, device.topology, host.triangle_count);
     expect_same_array(host.components, device.components, host.component_count);
+    expect_same_array(host.source_vertices, device.source_vertices, host.vertex_count);
+    expect_same_array(host.block_order, device.block_order, host.block_count);
   }
   if (contents == Contents::all)
     expect_same_array(host.blocks, device.blocks, host.block_count);
@@ -100,9 +104,10 @@ TEST_F(Gpu, AnUploadHasWhatItIsFor) {
       if (contents != Contents::manifolds) continue;
       needed +=
           host.triangle_count * sizeof(TriangleTopology) + host.component_count * sizeof(SurfaceComponent);
+      needed += (host.vertex_count + host.block_count) * sizeof(std::uint32_t);
     }
     EXPECT_GE(assets.bytes(), needed);
-    EXPECT_LT(assets.bytes(), needed + 12 * kSectionAlignment);
+    EXPECT_LT(assets.bytes(), needed + 18 * kSectionAlignment);
   }
 }
 
@@ -113,6 +118,7 @@ TEST_F(Gpu, AFileWithoutTopologyIsUploadedForManifoldsWithoutIt) {
   EXPECT_NE(uploaded.assets.level(0).triangles, nullptr);
   EXPECT_EQ(uploaded.assets.level(0).topology, nullptr);
   EXPECT_EQ(uploaded.assets.level(0).components, nullptr);
+  EXPECT_EQ(uploaded.assets.level(0).source_vertices, nullptr);
 }
 
 /// Files from one triangle on, of one level and of several, and so many views of them, in turn, that threads

@@ -20,7 +20,7 @@ class Info(ToolTest):
             "imaginary_minimum", "imaginary_fraction", "leaf_blocks", "internal_blocks", "partial_leaf_blocks", "depth",
             "leaf_fill", "sah_cost", "expected_block_pairs", "expected_candidates", "expected_oriented_block_pairs",
             "expected_oriented_candidates", "surface", "leaf_blocks_at_depth",
-            "blocks_with_fill", "bounds", "origin", "rounding_error", "source_faces", "source", "parts", "levels",
+            "blocks_with_fill", "bounds", "origin", "rounding_error", "source_faces", "source_vertices", "source", "parts", "levels",
             "sections"}
     VERDICT_KEYS = {"file", "sound", "status", "where", "error", "bytes", "check_seconds"}
 
@@ -29,7 +29,7 @@ class Info(ToolTest):
         self.assertEqual((page.returncode, page.stderr), (DONE, b""))
         for word in ("cube.obj", "triangles    12", "1 imaginary", "minimum 1", "0 partial leaf blocks", "depth", "SAH cost",
                      "block pairs", "oriented block pairs", "oriented_blocks", "8 vertices, 1 component, closed", "topology",
-                     "components", "bounds", "origin", "sections", "provenance"):
+                     "components", "source_vertices", "block_order", "8 source vertices", "bounds", "origin", "sections", "provenance"):
             self.assertIn(word, page.stdout.decode())
 
     def test_the_page_sends_no_control_characters_of_a_file_to_a_terminal(self):
@@ -153,7 +153,7 @@ class Info(ToolTest):
 def changed(path, change):
     """The .bvh file after change(its tables by name, as arrays that can be written to), its hash right."""
     raw = bytearray(path.read_bytes())
-    *_, section_count, _, _ = bvh_file.HEADER.unpack_from(raw)
+    *_, section_count, _, _, _ = bvh_file.HEADER.unpack_from(raw)
     tables = {}
     for i in range(section_count):
         kind, _, offset, _, count = bvh_file.SECTION.unpack_from(raw, bvh_file.HEADER.size + i * bvh_file.SECTION.size)

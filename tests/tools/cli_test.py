@@ -27,7 +27,7 @@ class Usage(ToolTest):
     def test_help_names_every_option_and_exit_code(self):
         for tool, words in ((BVHBUILD, ("MESH", "--output", "--imaginary", "minimal|free|SHARE", "--effort", "fast|default|best", "--strict", "--json",
                                         "--quiet", "--threads", "--reader", "--time-limit", "--memory-limit", "--expansion-limit",
-                                        "--no-topology", "--allow-outside-files", "--version", "Exit codes: 0 done")),
+                                        "--no-topology", "--no-refit", "--allow-outside-files", "--version", "Exit codes: 0 done")),
                             (BVHINFO, ("FILE", "--json", "--verify", "--version", "Exit codes: 0 all sound"))):
             help_text = self.succeeds(tool, "--help")
             for word in words:
@@ -514,7 +514,7 @@ class Streams(ToolTest):
 class BuildJson(ToolTest):
     ALWAYS = {"tool", "version", "exit_code", "error", "input", "output", "reader", "single_precision_reader", "faces",
               "vertices", "remarks", "findings", "seconds", "peak_memory_bytes"}
-    AFTER_SUCCESS = {"interrupted", "parts", "origin", "rounding_error", "tree", "gpu_blocks", "topology", "bytes",
+    AFTER_SUCCESS = {"interrupted", "parts", "origin", "rounding_error", "tree", "gpu_blocks", "topology", "refit", "bytes",
                      "hash"}
     FINDINGS = {"faces_index_out_of_range", "faces_too_few_corners", "faces_not_finite", "faces_too_large",
                 "faces_repeated_corner", "faces_not_simple",
@@ -532,7 +532,8 @@ class BuildJson(ToolTest):
         self.assertEqual(report["hash"], self.info_json(self.out)["hash"])
 
     def test_what_a_file_lacks_is_told(self):
-        for key, option, word in (("gpu_blocks", "--no-gpu-blocks", b"oriented blocks"), ("topology", "--no-topology", b"topology")):
+        for key, option, word in (("gpu_blocks", "--no-gpu-blocks", b"oriented blocks"), ("topology", "--no-topology", b"topology"),
+                                  ("refit", "--no-refit", b"source vertices")):
             with self.subTest(option):
                 self.assertTrue(self.built_json("a.obj", CUBE_OBJ)[key])
                 self.assertFalse(self.built_json("a.obj", CUBE_OBJ, option)[key])

@@ -68,7 +68,8 @@ class Oracle(ToolTest):
         out = self.built("a.obj", scattered_obj(300), "--no-gpu-blocks")
         self.assertIsNone(bvh_file.read(out).oriented_blocks)
         self.assertEqual(bvh_file.read(out).provenance["options"]["gpu_blocks"], False)
-        self.assertAlmostEqual((with_them - out.stat().st_size) / 112, len(blocks["fast"]), delta=256 / 112)
+        # A block order goes with them.
+        self.assertAlmostEqual((with_them - out.stat().st_size) / 116, len(blocks["fast"]), delta=512 / 116)
 
     def test_topology_is_left_out_where_asked(self):
         with_it = self.built("a.obj", scattered_obj(300)).stat().st_size
@@ -78,7 +79,37 @@ class Oracle(ToolTest):
         self.assertIsNone(file.components)
         self.assertEqual(file.provenance["options"]["topology"], False)
         self.assertEqual((file.levels[0]["vertices"], file.levels[0]["flags"]), (0, 0))
-        self.assertAlmostEqual(with_it - out.stat().st_size, 16 * 300 + 16 * 300, delta=512)
+        self.assertAlmostEqual(with_it - out.stat().st_size, 16 * 300 + 16 * 300, delta=512 + 4 * (900 + 160))
+
+    def test_source_vertices_are_rows_of_the_file_and_left_out_where_asked(self):
+        # Vertex 0 belongs to no face, 2 and 5 lie at one place, and so do 3 and 6 but for the sign of a zero.
+        rows = [(9, 9, 9), (0, 0, 0), (1, 0, 0), (0, 1, 0), (5, 5, 5), (1, 0, 0), (-0.0, 1, 0), (1, 1, 1)]
+        obj = "".join(f"v {x} {y} {z}\n" for x, y, z in rows) + "f 2 3 4\nf 6 8 7\n"
+        with_it = bvh_file.read(self.built("a.obj", obj))
+        self.assertEqual(with_it.source_vertex_count, 8)
+        self.assertEqual(sorted(with_it.source_vertices), [1, 2, 3, 7])
+        for triangle, corners in zip(with_it.topology, with_it.world):
+            for vertex, place in zip(triangle["vertex"], corners):
+                self.assertEqual(tuple(place), tuple(map(float, rows[with_it.source_vertices[vertex]])))
+        self.assertEqual(bvh_file.defects_of_topology(with_it) + bvh_file.defects_of_oriented_blocks(with_it), [])
+        for option in ("--no-refit", "--no-topology"):
+            out = bvh_file.read(self.built("a.obj", obj, option))
+            self.assertEqual(out.source_vertex_count, 0)
+            self.assertIsNone(out.source_vertices)
+            self.assertIsNone(out.block_order)
+        without = bvh_file.read(self.built("a.obj", obj, "--no-refit"))
+        self.assertEqual(without.provenance["options"]["refit"], False)
+        for section in ("blocks", "triangles", "oriented_blocks", "topology", "components"):
+            self.assertEqual(getattr(without, section).tobytes(), getattr(with_it, section).tobytes())
+        plain = bvh_file.read(self.built("a.obj", obj, "--no-gpu-blocks"))
+        self.assertIsNotNone(plain.source_vertices)
+        self.assertIsNone(plain.block_order)
+
+    def test_corners_of_stl_facets_and_the_vertices_of_each_part_are_source_vertices(self):
+        facet = "facet normal 0 0 0\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 %d\nendloop\nendfacet\n"
+        stl = bvh_file.read(self.built("a.stl", "solid a\n" + facet % 0 + facet % 1 + "endsolid a\n"))
+        self.assertEqual(stl.source_vertex_count, 6)
+        self.assertEqual(sorted(stl.source_vertices), [0, 1, 2, 5])
 
     def test_coincident_triangles_are_all_kept(self):
         out = self.built("a.obj", TRIANGLE_OBJ + "f 1 2 3\n" * 52)

@@ -24,7 +24,8 @@ std::vector<double> wanted_lengths(const Options& options, const StoredMesh& mes
 
 AssetLevel BuiltLevel::row(const Options& options) const {
   return {geometry,        face,        &tree,
-          oriented_blocks, error_bound, options.topology && topology ? &*topology : nullptr};
+          oriented_blocks, error_bound, options.topology && topology ? &*topology : nullptr,
+          source_vertex};
 }
 
 BuiltLevel build_level(const Geometry& geometry, const Options& options, OptimisationWatch& watch) {
@@ -75,6 +76,7 @@ CheckedImage build_file(const Options& options, const StoredMesh& mesh, AssetSou
   if (!options.levels.empty()) watch.begin_part(0, 0.3);
   levels.push_back(build_level({mesh.points, mesh.triangles}, options, watch));
   levels[0].face = mesh.face;
+  if (options.refit) levels[0].source_vertex = mesh.source_vertex;
   if (!options.levels.empty()) add_levels(options, mesh, watch, levels, outcome);
   outcome.interrupted = watch.stop;
   source.origin = mesh.origin;

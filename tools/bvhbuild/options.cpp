@@ -58,6 +58,8 @@ void add_options(const Tool& tool, Options& options, double& memory_gib, double&
         "leave out the oriented blocks, which exact queries on a GPU walk; the file is a quarter smaller"},
        {"--no-topology", OptionRow::Cleared{options.topology},
         "leave out how triangles hang together, which contact manifolds need: 16 bytes a triangle"},
+       {"--no-refit", OptionRow::Cleared{options.refit},
+        "leave out what refitting the tree to a bent mesh needs: 4 bytes a vertex and 4 a block"},
        {"--levels", [&options](const std::string& text) { parse_level_errors(text, options.levels); },
         "E1,E2,...|auto",
         "coarser levels of the mesh, each proved to be at most so far from the finest: lengths, or with % of "

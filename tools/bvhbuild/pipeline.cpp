@@ -101,6 +101,7 @@ std::string provenance_json(const Options& options, const Outcome& outcome) {
   Json shaping = {{"imaginary", name(options.imaginary)}, {"effort", name(options.effort)}};
   if (!options.gpu_blocks) shaping["gpu_blocks"] = false;
   if (!options.topology) shaping["topology"] = false;
+  if (!options.refit) shaping["refit"] = false;
   if (!options.levels.empty()) {
     shaping["levels"] = Json::array();
     for (const LevelError& error : options.levels) shaping["levels"].push_back(name(error));
@@ -139,6 +140,7 @@ Image build_image(const Options& options, const PolygonMesh& polygons, const Sto
   const StopOnInterrupt interrupt(options.effort == Effort::best ? &watch.stop : nullptr);
   AssetSource source;
   source.source_faces = outcome.clean.faces;
+  source.source_vertices = outcome.clean.vertices;
   source.parts = polygons.parts;
   const auto provenance = [&] { return provenance_json(options, outcome); };
   auto [image, asset] = build_file(options, mesh, source, provenance, watch, outcome);
@@ -146,6 +148,7 @@ Image build_image(const Options& options, const PolygonMesh& polygons, const Sto
   outcome.tree = measure_tree(asset.level(), header.lower, header.upper);
   outcome.gpu_blocks = asset.level().oriented_blocks != nullptr;
   outcome.topology = asset.level().topology != nullptr;
+  outcome.refit = asset.level().source_vertices != nullptr;
   outcome.hash = hexadecimal(header.hash);
   outcome.file_bytes = header.file_bytes;
   if (!options.levels.empty()) describe_levels(asset, outcome);

@@ -52,6 +52,7 @@ struct Outcome {
   TreeStatistics tree;
   bool gpu_blocks = false;  ///< the file has oriented blocks
   bool topology = false;    ///< the file has topology
+  bool refit = false;       ///< the file has what refitting needs
   std::uint64_t file_bytes = 0;
   std::string hash;  ///< of the output, 16 hexadecimal digits
 

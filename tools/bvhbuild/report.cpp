@@ -59,7 +59,8 @@ void add_results(const Outcome& outcome, Report& report) {
               {"interrupted", outcome.interrupted},
               {"tree", to_json(outcome.tree)},
               {"gpu_blocks", outcome.gpu_blocks},
-              {"topology", outcome.topology}});
+              {"topology", outcome.topology},
+              {"refit", outcome.refit}});
   if (!outcome.levels.empty()) {
     Json left_out = Json::array();
     for (const LevelLeftOut& error : outcome.levels_left_out) left_out.push_back(name(error.wanted));
@@ -138,6 +139,7 @@ void add_text(const Options& options, const Outcome& outcome, Report& report) {
   add_level_rows(outcome, report);
   if (!outcome.gpu_blocks) report.row("note", "no oriented blocks: exact queries on a GPU refuse the file");
   if (!outcome.topology) report.row("note", "no topology: contact manifolds refuse the file");
+  if (!outcome.refit) report.row("note", "no source vertices: the tree cannot be refitted to a bent mesh");
   if (outcome.interrupted) report.row("note", "interrupted: this is the best tree until then");
   report.row("took", seconds_words(options, outcome.seconds));
 }

@@ -24,6 +24,8 @@ constexpr std::pair<SectionKind, const char*> kSectionKinds[] = {
     {SectionKind::provenance, "provenance"},
     {SectionKind::oriented_blocks, "oriented_blocks"},
     {SectionKind::topology, "topology"},
+    {SectionKind::source_vertices, "source_vertices"},
+    {SectionKind::block_order, "block_order"},
     {SectionKind::components, "components"},
 };
 
@@ -224,6 +226,11 @@ void add_histogram(const char* title, const Counts& counts, std::size_t first, s
   }
 }
 
+std::string refit_words(const FileHeader& header) {
+  if (header.source_vertices == 0) return "no source vertices: the tree cannot be refitted to a bent mesh";
+  return "to positions of " + with_commas(header.source_vertices) + " source vertices";
+}
+
 void add_section_lines(const AssetView& view, Report& report) {
   report.line("  sections");
   for (const Section& section : view.sections) {
@@ -302,6 +309,7 @@ Report report_of(const Inspection& inspection) {
               {"origin", header.origin},
               {"rounding_error", header.rounding_error},
               {"source_faces", header.source_faces},
+              {"source_vertices", header.source_vertices > 0 ? Json(header.source_vertices) : Json()},
               {"source", inspection.source},
               {"parts", parts_json(view)}});
   const Json levels = levels_json(inspection);
@@ -313,6 +321,7 @@ Report report_of(const Inspection& inspection) {
   report.row("bounds", point(header.lower) + " to " + point(header.upper));
   report.row("origin", point(header.origin) + format(", rounding error %.3g", header.rounding_error));
   report.row("surface", surface_words(inspection.surface));
+  report.row("refit", refit_words(header));
   add_tree(inspection.tree, report);
   add_work(view.level(), inspection.work[0], report);
   if (view.levels.size() > 1) add_level_lines(levels, report);

@@ -56,8 +56,8 @@ public unsafe struct tandem_build_options {
   public uint effort;
   public uint no_gpu_blocks;
   public uint no_topology;
+  public uint no_refit;
   public uint threads;
-  public uint reserved;
   public double imaginary_share;
   public byte* provenance;
   public IntPtr progress;
@@ -593,12 +593,14 @@ public static unsafe class Native {
   public const uint TANDEM_BAD_ROTATION = 171;
   public const uint TANDEM_BAD_ORIENTED_BOX = 172;
   public const uint TANDEM_TRIANGLE_OUTSIDE_ORIENTED_BOX = 173;
+  public const uint TANDEM_BLOCK_ORDER_MISMATCH = 174;
   public const uint TANDEM_BAD_TOPOLOGY = 180;
   public const uint TANDEM_VERTEX_ORDER = 181;
   public const uint TANDEM_VERTEX_MISMATCH = 182;
   public const uint TANDEM_EDGE_MISMATCH = 183;
   public const uint TANDEM_BAD_WINDING = 184;
   public const uint TANDEM_COMPONENT_MISMATCH = 185;
+  public const uint TANDEM_SOURCE_VERTEX_MISMATCH = 186;
   public const uint TANDEM_OUT_OF_RANGE = 200;
   public const uint TANDEM_UNKNOWN_ASSET = 201;
   public const uint TANDEM_UNKNOWN_INSTANCE = 202;

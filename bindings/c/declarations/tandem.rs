@@ -67,12 +67,14 @@ pub const TANDEM_ORIENTED_BLOCK_MISMATCH: u32 = 170;
 pub const TANDEM_BAD_ROTATION: u32 = 171;
 pub const TANDEM_BAD_ORIENTED_BOX: u32 = 172;
 pub const TANDEM_TRIANGLE_OUTSIDE_ORIENTED_BOX: u32 = 173;
+pub const TANDEM_BLOCK_ORDER_MISMATCH: u32 = 174;
 pub const TANDEM_BAD_TOPOLOGY: u32 = 180;
 pub const TANDEM_VERTEX_ORDER: u32 = 181;
 pub const TANDEM_VERTEX_MISMATCH: u32 = 182;
 pub const TANDEM_EDGE_MISMATCH: u32 = 183;
 pub const TANDEM_BAD_WINDING: u32 = 184;
 pub const TANDEM_COMPONENT_MISMATCH: u32 = 185;
+pub const TANDEM_SOURCE_VERTEX_MISMATCH: u32 = 186;
 pub const TANDEM_OUT_OF_RANGE: u32 = 200;
 pub const TANDEM_UNKNOWN_ASSET: u32 = 201;
 pub const TANDEM_UNKNOWN_INSTANCE: u32 = 202;
@@ -229,8 +231,8 @@ pub struct tandem_build_options {
     pub effort: u32,
     pub no_gpu_blocks: u32,
     pub no_topology: u32,
+    pub no_refit: u32,
     pub threads: u32,
-    pub reserved: u32,
     pub imaginary_share: f64,
     pub provenance: *const c_char,
     pub progress: Option<unsafe extern "C" fn(user: *mut c_void, share: f64) -> u32>,

@@ -54,13 +54,14 @@ tandem_status read_options(const tandem_build_options* given, tandem_build_optio
                            build::BuildOptions& options) {
   if (const tandem_status status = read_struct(given, read); status != TANDEM_OK) return status;
   const bool known = read.effort <= TANDEM_EFFORT_BEST && read.no_gpu_blocks <= 1 && read.no_topology <= 1 &&
-                     read.reserved == 0 && read.imaginary_share >= 0 && read.imaginary_share <= 1;
+                     read.no_refit <= 1 && read.imaginary_share >= 0 && read.imaginary_share <= 1;
   if (!known) return TANDEM_BAD_OPTION;
   constexpr build::Effort kEfforts[] = {build::Effort::standard, build::Effort::fast, build::Effort::best};
   options.effort = kEfforts[read.effort];
   options.imaginary.share = read.imaginary_share;
   options.gpu_blocks = read.no_gpu_blocks == 0;
   options.topology = read.no_topology == 0;
+  options.refit = read.no_refit == 0;
   options.threads = read.threads;
   return TANDEM_OK;
 }

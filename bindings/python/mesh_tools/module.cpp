@@ -101,7 +101,7 @@ Source make_source(nb::handle points, nb::handle corners, nb::handle face_begin,
 // The file's bytes and a report; no bytes where no triangle can be used. face_of: of each polygon or None.
 nb::tuple build(nb::handle points, nb::handle corners, nb::handle face_begin, nb::handle face_of,
                 const std::vector<Part>& parts, std::uint32_t effort, bool gpu_blocks, bool topology,
-                std::uint32_t threads, double imaginary_share, const std::string& levels,
+                bool refit, std::uint32_t threads, double imaginary_share, const std::string& levels,
                 const nb::object& provenance, nb::handle progress) {
   Source source = make_source(points, corners, face_begin, face_of, parts);
   Options options;
@@ -110,6 +110,7 @@ nb::tuple build(nb::handle points, nb::handle corners, nb::handle face_begin, nb
   options.imaginary.share = imaginary_share;
   options.gpu_blocks = gpu_blocks;
   options.topology = topology;
+  options.refit = refit;
   std::string defect = levels.empty() ? "" : parse_level_errors(levels, options.levels);
   if (!defect.empty()) throw nb::value_error(("levels: " + defect).c_str());
   const std::string said = provenance.is_none() ? "" : nb::cast<std::string>(provenance);
@@ -130,6 +131,7 @@ nb::tuple build(nb::handle points, nb::handle corners, nb::handle face_begin, nb
     if (mesh.triangles.empty() || !(defect = level_errors_defect(options, mesh)).empty()) return;
     AssetSource about;
     about.source_faces = source.face_count;
+    about.source_vertices = outcome.clean.vertices;
     about.parts = source.polygons.parts;
     const auto words = [&] { return said.empty() ? provenance_of(options, outcome) : said; };
     file = build_file(options, mesh, about, words, optimisation, outcome);
@@ -150,5 +152,5 @@ NB_MODULE(_bvhbuild, module) {
   const auto none = [] { return nanobind::arg().none(); };
   const auto some = [] { return nanobind::arg(); };
   module.def("build", tandem::build::build, some(), some(), some(), none(), some(), some(), some(), some(),
-             some(), some(), some(), none(), none());
+             some(), some(), some(), some(), none(), none());
 }

@@ -31,7 +31,7 @@ nb::tuple to_tuple(const tandem_build_report& of) {
 
 // Positions and triangles by rows; faces of triangles or None; names, paths and counts of faces of parts.
 nb::tuple build(nb::handle positions, nb::handle triangles, nb::handle faces, const std::vector<Part>& parts,
-                std::uint32_t effort, bool gpu_blocks, bool topology, std::uint32_t threads,
+                std::uint32_t effort, bool gpu_blocks, bool topology, bool refit, std::uint32_t threads,
                 double imaginary_share, const nb::object& provenance, nb::handle progress) {
   const auto points = copy_rows<double>(positions);
   const auto corners = copy_rows<std::uint32_t>(triangles);
@@ -54,6 +54,7 @@ nb::tuple build(nb::handle positions, nb::handle triangles, nb::handle faces, co
   options.effort = effort;
   options.no_gpu_blocks = !gpu_blocks;
   options.no_topology = !topology;
+  options.no_refit = !refit;
   options.threads = threads;
   options.imaginary_share = imaginary_share;
   options.provenance = provenance.is_none() ? nullptr : nb::borrow<nb::str>(provenance).c_str();
@@ -76,7 +77,7 @@ nb::tuple build(nb::handle positions, nb::handle triangles, nb::handle faces, co
 
 void add_builder(nb::module_& module) {
   module.def("build", build, nb::arg(), nb::arg(), nb::arg().none(), nb::arg(), nb::arg(), nb::arg(),
-             nb::arg(), nb::arg(), nb::arg(), nb::arg().none(), nb::arg().none());
+             nb::arg(), nb::arg(), nb::arg(), nb::arg(), nb::arg().none(), nb::arg().none());
 }
 
 }  // namespace tandem::python

@@ -74,18 +74,18 @@ Progress = Callable[[float], object]
 
 @overload
 def build(vertices: Vertices, faces: Faces = ..., *, effort: Effort = ..., levels: Levels | None = ..., threads: int = ...,
-          gpu_blocks: bool = ..., topology: bool = ..., imaginary_share: float = ..., face_ids: npt.ArrayLike | None = ..., parts: Parts | None = ...,
+          gpu_blocks: bool = ..., topology: bool = ..., refit: bool = ..., imaginary_share: float = ..., face_ids: npt.ArrayLike | None = ..., parts: Parts | None = ...,
           provenance: str | None = ..., progress: Progress | None = ..., return_report: Literal[False] = ...) -> Asset: ...
 
 
 @overload
 def build(vertices: Vertices, faces: Faces = ..., *, effort: Effort = ..., levels: Levels | None = ..., threads: int = ...,
-          gpu_blocks: bool = ..., topology: bool = ..., imaginary_share: float = ..., face_ids: npt.ArrayLike | None = ..., parts: Parts | None = ...,
+          gpu_blocks: bool = ..., topology: bool = ..., refit: bool = ..., imaginary_share: float = ..., face_ids: npt.ArrayLike | None = ..., parts: Parts | None = ...,
           provenance: str | None = ..., progress: Progress | None = ..., return_report: Literal[True]) -> tuple[Asset, BuildReport]: ...
 
 
 def build(vertices: Vertices, faces: Faces = None, *, effort: Effort = "default", levels: Levels | None = None, threads: int = 0,
-          gpu_blocks: bool = True, topology: bool = True, imaginary_share: float = 0.0, face_ids: npt.ArrayLike | None = None, parts: Parts | None = None,
+          gpu_blocks: bool = True, topology: bool = True, refit: bool = True, imaginary_share: float = 0.0, face_ids: npt.ArrayLike | None = None, parts: Parts | None = None,
           provenance: str | None = None, progress: Progress | None = None, return_report: bool = False) -> Asset | tuple[Asset, BuildReport]:
     """Builds an asset: the bytes that bvhbuild writes for these faces, but for what they say of their making.
 
@@ -98,6 +98,7 @@ def build(vertices: Vertices, faces: Faces = None, *, effort: Effort = "default"
         threads: at most; 0: as many as the machine has. The bytes do not depend on it.
         gpu_blocks: with the blocks that exact queries on a GPU walk.
         topology: with what manifolds and contained bodies need.
+        refit: with what refitting the tree to a bent mesh needs, which is left out without topology.
         imaginary_share: padding nodes: 0, the proven fewest, to 1, as many as a free tree has.
         face_ids: (m,), the face of the caller's mesh that each one is a piece of; its own number where not given.
         parts: of each run of faces with a name: name, path and number of faces, or what `read_mesh` says.
@@ -138,15 +139,16 @@ def build(vertices: Vertices, faces: Faces = None, *, effort: Effort = "default"
         _text(provenance, "provenance")
     if progress is not None and not callable(progress):
         raise TypeError(f"progress is {type(progress).__name__} where a function is wanted")
-    gpu, topological, reported = flag(gpu_blocks, "gpu_blocks"), flag(topology, "topology"), flag(return_report, "return_report")
+    gpu, topological, bends = flag(gpu_blocks, "gpu_blocks"), flag(topology, "topology"), flag(refit, "refit")
+    reported = flag(return_report, "return_report")
     strength = _choice("effort", effort, ("default", "fast", "best"))
     if levels is None and face_begin is None:
-        core, report = _tandem.build(points, corners, ids, named, strength, gpu, topological, workers, share, provenance, progress)
+        core, report = _tandem.build(points, corners, ids, named, strength, gpu, topological, bends, workers, share, provenance, progress)
         asset = Asset._of(core)
     else:
         if face_begin is None:
             face_begin = np.arange(0, 3 * count + 1, 3, dtype=np.uint32)
-        data, report = _mesh_tools().build(points, corners, face_begin, ids, named, strength, gpu, topological, workers, share,
+        data, report = _mesh_tools().build(points, corners, face_begin, ids, named, strength, gpu, topological, bends, workers, share,
                                            _words(levels), provenance, progress)
         if data is None:
             raise _no_triangle()

@@ -32,6 +32,8 @@ LevelView copied_level(LevelView level, std::span<const Piece> pieces, Contents 
   copied(level.oriented_blocks, SectionKind::oriented_blocks);
   copied(level.topology, SectionKind::topology);
   copied(level.components, SectionKind::components);
+  copied(level.source_vertices, SectionKind::source_vertices);
+  copied(level.block_order, SectionKind::block_order);
   return level;
 }
 

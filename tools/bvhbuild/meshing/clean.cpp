@@ -40,6 +40,11 @@ void rename_corners(TriangleMesh& mesh, const std::vector<std::uint32_t>& new_in
     for (std::uint32_t& corner : triangle) corner = new_index[corner];
 }
 
+/// Returns the vertex of the file that a point is.
+std::uint32_t source_of(const TriangleMesh& mesh, std::size_t point) {
+  return mesh.source_vertex.empty() ? static_cast<std::uint32_t>(point) : mesh.source_vertex[point];
+}
+
 /// Points move to the front as they are found to be new, which never overtakes the reading: a new index is at
 /// most the old.
 void weld(TriangleMesh& mesh, CleanReport& report) {
@@ -47,6 +52,7 @@ void weld(TriangleMesh& mesh, CleanReport& report) {
   IndexTable table(mesh.points.size());
   std::uint32_t kept = 0;
   std::uint64_t used = 0;
+  std::vector<std::uint32_t> source_vertex;
   const auto hash = [&](std::size_t i) { return hash_place(normalised(mesh.points[i])); };
   for_each_prefetched(mesh.points.size(), table, hash, [&](std::uint32_t i, std::uint64_t hash_i) {
     if (new_index[i] == kNoVertex) return;
@@ -54,10 +60,13 @@ void weld(TriangleMesh& mesh, CleanReport& report) {
     const Point place = normalised(mesh.points[i]);
     new_index[i] =
         table.find_or_insert(hash_i, kept, [&](std::uint32_t k) { return mesh.points[k] == place; });
-    if (new_index[i] == kept) mesh.points[kept++] = place;
+    if (new_index[i] != kept) return;
+    mesh.points[kept++] = place;
+    source_vertex.push_back(source_of(mesh, i));
   });
   mesh.points.resize(kept);
   mesh.points.shrink_to_fit();
+  mesh.source_vertex = std::move(source_vertex);
   rename_corners(mesh, new_index);
   report.vertices_welded += used - kept;
 }
@@ -89,10 +98,12 @@ void drop_unused_points(TriangleMesh& mesh) {
   for (std::size_t i = 0; i < mesh.points.size(); ++i) {
     if (new_index[i] == kNoVertex) continue;
     mesh.points[kept] = mesh.points[i];
+    mesh.source_vertex[kept] = mesh.source_vertex[i];
     new_index[i] = kept++;
   }
   if (kept == mesh.points.size()) return;
   mesh.points.resize(kept);
+  mesh.source_vertex.resize(kept);
   rename_corners(mesh, new_index);
 }
 

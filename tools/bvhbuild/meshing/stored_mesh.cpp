@@ -119,8 +119,10 @@ StoredMesh to_single_precision(TriangleMesh& mesh, CleanReport& report) {
   mesh.points = {};
   out.triangles = std::move(mesh.triangles);
   out.face = std::move(mesh.face);
+  out.source_vertex = std::move(mesh.source_vertex);
   mesh.triangles = {};
   mesh.face = {};
+  mesh.source_vertex = {};
   if (out.largest_rounding_error > 0) report.triangles_flattened += count_flat(out);
   return out;
 }

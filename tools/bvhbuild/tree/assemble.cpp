@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <functional>
 #include <new>
 #include <stdexcept>
 #include <string>
@@ -98,12 +99,15 @@ void write_triangles(const AssetLevel& level, std::span<const Part> parts, Trian
 Plan plan_sections(const PartTable& table, const AssetSource& source, std::span<const AssetLevel> levels) {
   std::size_t optional = 0;
   for (const AssetLevel& level : levels)
-    optional += (level.oriented_blocks.empty() ? 0 : 1) + (level.topology == nullptr ? 0 : 2);
+    optional += (level.oriented_blocks.empty() ? 0 : 1) + (level.topology == nullptr ? 0 : 2) +
+                (!level.can_be_refitted()        ? 0
+                 : level.oriented_blocks.empty() ? 1
+                                                 : 2);
   Plan plan(2 * levels.size() + optional + 4);
   plan.add(SectionKind::levels, 0, levels.size(), sizeof(Level));
   for (std::uint32_t i = 0; i < levels.size(); ++i) {
     // The sections that exact queries on a GPU need lie together, for one copy, and behind it what manifolds
-    // need too.
+    // need too, and what refitting needs.
     plan.add(SectionKind::blocks, i, levels[i].tree->blocks.size(), sizeof(Block));
     plan.add(SectionKind::triangles, i, levels[i].geometry.triangles.size(), sizeof(Triangle));
     if (!levels[i].oriented_blocks.empty())
@@ -111,6 +115,11 @@ Plan plan_sections(const PartTable& table, const AssetSource& source, std::span<
     if (const SurfaceTopology* topology = levels[i].topology; topology != nullptr) {
       plan.add(SectionKind::topology, i, topology->triangles.size(), sizeof(TriangleTopology));
       plan.add(SectionKind::components, i, topology->components.size(), sizeof(SurfaceComponent));
+    }
+    if (levels[i].can_be_refitted()) {
+      plan.add(SectionKind::source_vertices, i, levels[i].topology->vertex_count, sizeof(std::uint32_t));
+      if (!levels[i].oriented_blocks.empty())
+        plan.add(SectionKind::block_order, i, levels[i].oriented_blocks.size(), sizeof(std::uint32_t));
     }
   }
   plan.add(SectionKind::parts, 0, table.parts.size(), sizeof(Part));
@@ -134,6 +143,8 @@ FileHeader make_header(const AssetSource& source, std::span<const AssetLevel> le
   header.rounding_error = source.rounding_error;
   header.section_count = static_cast<std::uint32_t>(plan.sections().size());
   header.level_count = static_cast<std::uint32_t>(levels.size());
+  if (std::any_of(levels.begin(), levels.end(), std::mem_fn(&AssetLevel::can_be_refitted)))
+    header.source_vertices = source.source_vertices;
   return header;
 }
 
@@ -149,6 +160,13 @@ Level make_level(const AssetLevel& level) {
     row.flags = level.topology->closed ? kClosedLevel : 0;
   }
   return row;
+}
+
+std::vector<std::uint32_t> source_vertices(const AssetLevel& level) {
+  std::vector<std::uint32_t> source;
+  source.reserve(level.topology->vertex_count);
+  for (const std::uint32_t point : level.topology->point) source.push_back(level.source_vertex[point]);
+  return source;
 }
 
 // Copies into the image and checks that the copy fills its section exactly.
@@ -175,6 +193,10 @@ void write_section(const Section& section, const AssetSource& source, std::span<
       return fill(image, section, level.topology->triangles);
     case SectionKind::components:
       return fill(image, section, level.topology->components);
+    case SectionKind::source_vertices:
+      return fill(image, section, source_vertices(level));
+    case SectionKind::block_order:
+      return fill(image, section, block_order(*level.tree));
     case SectionKind::triangles:
       return write_triangles(level, table.parts, reinterpret_cast<Triangle*>(image.data() + section.offset));
     case SectionKind::parts:

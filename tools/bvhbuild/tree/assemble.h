@@ -23,6 +23,11 @@ struct AssetLevel {
   std::span<const OrientedBlock> oriented_blocks;  ///< of the tree; may be empty
   double error_bound = 0;
   const SurfaceTopology* topology = nullptr;  ///< of the tree, or null: the level has none
+  /// The source vertex of each point of the geometry, ascending. The file gets those of the topology's
+  /// vertices, and the order of oriented blocks. Empty: the level cannot be refitted.
+  std::span<const std::uint32_t> source_vertex{};
+
+  bool can_be_refitted() const { return topology != nullptr && !source_vertex.empty(); }
 };
 
 /// Everything else that a file holds.
@@ -30,6 +35,7 @@ struct AssetSource {
   std::array<double, 3> origin{};
   double rounding_error = 0;
   std::uint64_t source_faces = 0;
+  std::uint64_t source_vertices = 0;  ///< more than every source vertex of a level
   std::span<const SourcePart> parts;  ///< ascending, without gaps, together source_faces faces
   std::string provenance;             ///< JSON
 };

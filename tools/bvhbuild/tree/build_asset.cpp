@@ -29,6 +29,7 @@ std::string usual_provenance(const BuildOptions& options, const CleanReport& rep
                      name(options.effort) + "\"";
   if (!options.gpu_blocks) json += R"(,"gpu_blocks":false)";
   if (!options.topology) json += R"(,"topology":false)";
+  if (!options.refit) json += R"(,"refit":false)";
   if (interrupted) json += R"(,"interrupted":true)";
   json += R"(},"findings":{)";
   bool first = true;
@@ -53,15 +54,20 @@ BuiltAsset build_asset(const TriangleSource& given, const BuildOptions& options,
   source.origin = mesh.origin;
   source.rounding_error = mesh.largest_rounding_error;
   source.source_faces = given.face.empty() ? given.triangles.size() : given.face_count;
+  source.source_vertices = given.points.size();
   const SourcePart whole = {{}, {}, 0, source.source_faces};
   source.parts = given.parts.empty() ? std::span(&whole, 1) : given.parts;
   const Geometry geometry{mesh.points, mesh.triangles};
   const LevelParts parts = build_parts(geometry, options, watch);
   source.provenance =
       provenance.empty() ? usual_provenance(options, built.clean, watch.stop) : std::move(provenance);
-  const AssetLevel level = {geometry,    mesh.face,
-                            &parts.tree, parts.oriented_blocks,
-                            0,           parts.topology ? &*parts.topology : nullptr};
+  const AssetLevel level = {geometry,
+                            mesh.face,
+                            &parts.tree,
+                            parts.oriented_blocks,
+                            0,
+                            parts.topology ? &*parts.topology : nullptr,
+                            options.refit ? std::span(mesh.source_vertex) : std::span<const std::uint32_t>()};
   built.file = assemble_checked(source, {&level, 1});
   watch.reach(1);
   return built;

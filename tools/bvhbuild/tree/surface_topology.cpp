@@ -206,8 +206,12 @@ void weld(const Geometry& geometry, const Tree& tree, SurfaceTopology& surface) 
   for (const std::uint32_t source : tree.order) {
     TriangleTopology& triangle = surface.triangles.emplace_back();
     for (std::size_t k = 0; k < 3; ++k) {
-      std::uint32_t& number = vertex[first[geometry.triangles[source][k]]];
-      if (number == kNoIndex) number = surface.vertex_count++;
+      const std::uint32_t point = first[geometry.triangles[source][k]];
+      std::uint32_t& number = vertex[point];
+      if (number == kNoIndex) {
+        number = surface.vertex_count++;
+        surface.point.push_back(point);
+      }
       triangle.vertex[k] = number;
     }
   }

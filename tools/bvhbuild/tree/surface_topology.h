@@ -39,7 +39,8 @@ struct SurfaceTopology {
   std::vector<TriangleTopology> triangles;   ///< in leaf order
   std::vector<SurfaceComponent> components;  ///< by first triangle
   std::uint32_t vertex_count = 0;
-  bool closed = false;  ///< all components are
+  std::vector<std::uint32_t> point;  ///< of each vertex: the first point of the geometry at its position
+  bool closed = false;               ///< all components are
 };
 
 /// Welds corners at the same position, counts the sides of edges, and orients: windings are made to

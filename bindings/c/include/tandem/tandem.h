@@ -84,9 +84,10 @@ enum {
   TANDEM_CHILD_OUTSIDE_PARENT_BOX = 157, TANDEM_BAD_FACE = 158, TANDEM_BOUNDS_MISMATCH = 159,
   TANDEM_LEVEL_OUTSIDE_BOUNDS = 160,
   TANDEM_ORIENTED_BLOCK_MISMATCH = 170, TANDEM_BAD_ROTATION = 171, TANDEM_BAD_ORIENTED_BOX = 172,
-  TANDEM_TRIANGLE_OUTSIDE_ORIENTED_BOX = 173,
+  TANDEM_TRIANGLE_OUTSIDE_ORIENTED_BOX = 173, TANDEM_BLOCK_ORDER_MISMATCH = 174,
   TANDEM_BAD_TOPOLOGY = 180, TANDEM_VERTEX_ORDER = 181, TANDEM_VERTEX_MISMATCH = 182,
   TANDEM_EDGE_MISMATCH = 183, TANDEM_BAD_WINDING = 184, TANDEM_COMPONENT_MISMATCH = 185,
+  TANDEM_SOURCE_VERTEX_MISMATCH = 186,
   // Bodies and questions.
   TANDEM_OUT_OF_RANGE = 200, TANDEM_UNKNOWN_ASSET = 201, TANDEM_UNKNOWN_INSTANCE = 202,
   TANDEM_UNKNOWN_CONTACT = 203, TANDEM_POSE_NOT_RIGID = 204, TANDEM_TOO_MANY_INSTANCES = 205,
@@ -199,8 +200,8 @@ typedef struct tandem_build_options {
   uint32_t effort;         ///< TANDEM_EFFORT_DEFAULT, ...; the best takes minutes for 100,000 triangles
   uint32_t no_gpu_blocks;  ///< 1: without the blocks that exact queries on a GPU walk
   uint32_t no_topology;    ///< 1: without what manifolds and contained bodies need
+  uint32_t no_refit;       ///< 1: without what refitting the tree to a bent mesh needs
   uint32_t threads;        ///< at most; 0: as many as the machine has. The bytes do not depend on it
-  uint32_t reserved;
   double imaginary_share;  ///< padding nodes: 0: the proven fewest; to 1: as many as a free tree has
   const char* provenance;  ///< JSON that the file says of its making, or null: options and findings
   /// Null, or a function that is called now and then, by one thread at a time, with the share of the

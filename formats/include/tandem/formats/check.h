@@ -29,8 +29,9 @@ enum class CheckDepth : std::uint8_t {
 /// oriented boxes of all nodes above it too. Where there is topology, it is that of these triangles: vertices
 /// are their positions, edges and components are counted right, and windings agree where they can; which side
 /// of several components is outside is nothing that a file can show (FORMAT.md). A quick check leaves out
-/// what oriented boxes hold and what topology says beyond the range of its indices: with a file that lies
-/// there exact queries on a GPU could miss contacts, and manifolds be wrong, but nothing reads out of bounds.
+/// what oriented boxes hold and what topology and source vertices say beyond the range of their indices: with
+/// a file that lies there exact queries on a GPU could miss contacts, and manifolds be wrong, but nothing
+/// reads out of bounds.
 ///
 /// Error bounds of levels are the writer's word, as the rounding error of the header is: that they are finite
 /// and ascend is checked, not that they hold, which takes as long as making levels. Of a file that lies

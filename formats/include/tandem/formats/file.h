@@ -13,7 +13,7 @@ inline constexpr std::uint16_t kVersionMajor = 1;
 inline constexpr std::uint16_t kVersionMinor = 0;
 inline constexpr std::uint64_t kSectionAlignment = 256;
 inline constexpr std::uint32_t kMaxLevels = 32;
-inline constexpr std::uint32_t kMaxSections = 5 * kMaxLevels + 4;
+inline constexpr std::uint32_t kMaxSections = 7 * kMaxLevels + 4;
 
 /// Bytes 0 to 127 of a file. The section table follows.
 ///
@@ -31,12 +31,13 @@ struct FileHeader {
   std::uint64_t source_faces;  ///< faces of the source file, before triangulation and cleaning
   double rounding_error;       ///< largest |stored + origin - source| of a coordinate
   std::uint32_t section_count, level_count;
-  std::uint64_t source_vertices;  ///< vertices of the source, as section source_vertices counts them; or 0
+  std::uint64_t source_vertices;  ///< vertices of the source file; 0: no level has source_vertices
   std::uint8_t reserved[16];      ///< zero
 };
 static_assert(sizeof(FileHeader) == 128 && offsetof(FileHeader, byte_order) == 16 &&
               offsetof(FileHeader, origin) == 32 && offsetof(FileHeader, lower) == 56 &&
-              offsetof(FileHeader, source_faces) == 80 && offsetof(FileHeader, section_count) == 96);
+              offsetof(FileHeader, source_faces) == 80 && offsetof(FileHeader, section_count) == 96 &&
+              offsetof(FileHeader, source_vertices) == 104);
 
 enum class SectionKind : std::uint32_t {
   levels = 1,           ///< Level[level_count], one for the file
@@ -48,6 +49,12 @@ enum class SectionKind : std::uint32_t {
   oriented_blocks = 7,  ///< OrientedBlock[], at most one for each level: what exact queries on a GPU walk
   topology = 8,         ///< TriangleTopology[], at most one for each level: what contact manifolds need
   components = 9,       ///< SurfaceComponent[], one for each level that has topology
+  /// std::uint32_t[], at most one for each level that has topology: the source vertex of each vertex.
+  /// Refitting needs it.
+  source_vertices = 10,
+  /// std::uint32_t[], one for each level that has oriented blocks and source vertices: the block that each
+  /// oriented block belongs to.
+  block_order = 11,
 };
 
 /// One row of the section table.
@@ -69,7 +76,7 @@ struct Level {
   std::uint32_t depth;  ///< blocks from the root block to the deepest leaf block, both counted
   double error_bound;   ///< upper bound of the distance of the level's surface from level 0's; 0 for level 0,
                         ///< ascending
-  std::uint32_t vertex_count;  ///< different positions of corners; 0: the level has no topology
+  std::uint32_t vertex_count;  ///< of the topology; 0: the level has none
   std::uint32_t flags;         ///< kClosedLevel or 0
 };
 static_assert(sizeof(Level) == 32);

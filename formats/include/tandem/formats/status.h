@@ -56,6 +56,7 @@ enum class [[nodiscard]] Status : std::uint32_t{
     kBadRotation,                  ///< a rotation that is no quaternion of whole numbers in their range
     kBadOrientedBox,  ///< a box that is none, that reaches too far, or a size that is not the boxes'
     kTriangleOutsideOrientedBox,  ///< of a node above it
+    kBlockOrderMismatch,          ///< the block order names another block than an oriented block's own
     // The topology.
     kBadTopology = 180,  ///< a vertex out of range, an unknown flag set, or a component that is none
     kVertexOrder,        ///< vertices are not numbered by first appearance
@@ -63,6 +64,7 @@ enum class [[nodiscard]] Status : std::uint32_t{
     kEdgeMismatch,  ///< a boundary or an edge of many triangles where there is none, or the other way round
     kBadWinding,    ///< windings, once turned, disagree or are inside out where that can be known
     kComponentMismatch,  ///< the components are not those of the triangles, or open where said to be closed
+    kSourceVertexMismatch,  ///< a source vertex out of range, or two vertices with the same one
     // Querying.
     kOutOfRange = 200,  ///< a coordinate that is NaN or larger than the query can take
     kUnknownAsset,      ///< an instance of an asset that the query was not given

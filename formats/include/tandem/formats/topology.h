@@ -17,8 +17,10 @@ namespace tandem {
 ///     byte 0          4          8          12      16
 ///          | vertex 0 | vertex 1 | vertex 2 | flags |
 ///
-/// Corners at the same stored position (-0 is 0) have the same vertex, others have not. Vertices are numbered
-/// by first appearance, in the order of the triangles and their corners.
+/// Corners at different stored positions have different vertices. Corners at the same position (-0 is 0) have
+/// the same one, unless the level has source vertices: then two vertices may lie at one position, which part
+/// when the mesh bends. Vertices are numbered by first appearance, in the order of the triangles and their
+/// corners.
 struct alignas(16) TriangleTopology {
   std::uint32_t vertex[3];
   std::uint32_t flags;  ///< kTurned | kBoundaryEdge0 << k | kManyTriangles0 << k

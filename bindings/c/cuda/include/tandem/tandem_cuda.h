@@ -57,7 +57,8 @@ typedef struct tandem_gpu_assets tandem_gpu_assets;
 enum {
   TANDEM_CONTENTS_ALL = 0,            ///< whatever the files hold
   TANDEM_CONTENTS_EXACT_QUERIES = 1,  ///< what queries of mode TANDEM_EXACT take, and those by tolerance
-  TANDEM_CONTENTS_MANIFOLDS = 2       ///< these and topology, which manifolds and contained bodies take
+  TANDEM_CONTENTS_MANIFOLDS =
+      2  ///< these, topology, which manifolds and contained bodies take, and what refitting needs
 };
 
 typedef struct tandem_upload_options {

@@ -7,7 +7,7 @@ namespace tandem {
 enum class Contents : std::uint8_t {
   all,            ///< all of them; of a whole file also what lies beside them
   exact_queries,  ///< triangles and oriented blocks: what queries of mode exact take, a third less
-  manifolds,      ///< these and topology: what contact manifolds take besides
+  manifolds,      ///< these, topology, and what refitting needs: what contact manifolds take besides
 };
 
 }  // namespace tandem

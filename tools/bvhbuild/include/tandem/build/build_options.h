@@ -33,6 +33,7 @@ struct BuildOptions {
   Effort effort = Effort::standard;
   bool gpu_blocks = true;  ///< the file gets oriented blocks
   bool topology = true;    ///< the file gets topology
+  bool refit = true;       ///< where it gets topology, also what refitting the tree to a bent mesh needs
   unsigned threads = 0;    ///< that build, at most; 0: as many as the process may use
 };
 

@@ -54,20 +54,31 @@ enum class Bend { twist, fold, shear, wave, flatten, collapse, inside_out, noise
 inline constexpr Bend kBends[] = {Bend::twist,    Bend::fold,       Bend::shear, Bend::wave, Bend::flatten,
                                   Bend::collapse, Bend::inside_out, Bend::noise, Bend::huge, Bend::tiny};
 
-inline std::array<double, 3> bent(Bend bend, double amount, const std::array<double, 3>& p, RandomPoses& random) {
+inline std::array<double, 3> bent(Bend bend, double amount, const std::array<double, 3>& p,
+                                  RandomPoses& random) {
   const auto [x, y, z] = p;
   const double c = std::cos(amount * z + x), s = std::sin(amount * z + x);
   switch (bend) {
-    case Bend::twist: return {c * x - s * y, s * x + c * y, z};
-    case Bend::fold: return {std::fabs(x), y, z + amount * 1e-3 * x};
-    case Bend::shear: return {x + amount * y, y, z};
-    case Bend::wave: return {x, y, z + 0.3 * std::sin(amount * 5 * x) * std::cos(3 * y)};
-    case Bend::flatten: return {x, y, 0};
-    case Bend::collapse: return {0.25, 0.25, 0.25};
-    case Bend::inside_out: return {-x, -y, -z};
-    case Bend::noise: return {x + random.symmetric(amount), y + random.symmetric(amount), z + random.symmetric(amount)};
-    case Bend::huge: return {1e15 * x, 1e15 * y, 1e15 * z};
-    case Bend::tiny: return {1e-42 * x, 1e-42 * y, 1e-42 * z};
+    case Bend::twist:
+      return {c * x - s * y, s * x + c * y, z};
+    case Bend::fold:
+      return {std::fabs(x), y, z + amount * 1e-3 * x};
+    case Bend::shear:
+      return {x + amount * y, y, z};
+    case Bend::wave:
+      return {x, y, z + 0.3 * std::sin(amount * 5 * x) * std::cos(3 * y)};
+    case Bend::flatten:
+      return {x, y, 0};
+    case Bend::collapse:
+      return {0.25, 0.25, 0.25};
+    case Bend::inside_out:
+      return {-x, -y, -z};
+    case Bend::noise:
+      return {x + random.symmetric(amount), y + random.symmetric(amount), z + random.symmetric(amount)};
+    case Bend::huge:
+      return {1e15 * x, 1e15 * y, 1e15 * z};
+    case Bend::tiny:
+      return {1e-42 * x, 1e-42 * y, 1e-42 * z};
   }
   return p;
 }

@@ -151,7 +151,8 @@ TEST(Deform, AnswersAreThoseOfATreeBuiltAnew) {
     anew.set_assets();
     anew.instances = of.instances;
     anew.place();
-    for (const double within : {0.0, 0.05, 0.5}) ASSERT_EQ(of.found({.within = within}), anew.found({.within = within}));
+    for (const double within : {0.0, 0.05, 0.5})
+      ASSERT_EQ(of.found({.within = within}), anew.found({.within = within}));
     for (const QueryMode mode : {QueryMode::fast, QueryMode::boxes}) {
       const FaceContacts expected = of.all(false), got = of.found({.mode = mode});
       if (mode == QueryMode::boxes) {
@@ -204,7 +205,8 @@ TEST(Deform, ABodyMovesBeforeAndAfter) {
         ASSERT_EQ(of.scene.move(body, pose), Status::kOk);
       }
     } else {
-      of.deform(body, bent(kBends[random.below(8)], random.symmetric(2), positions_of(of.meshes[body]), random),
+      of.deform(body,
+                bent(kBends[random.below(8)], random.symmetric(2), positions_of(of.meshes[body]), random),
                 random.below(2) == 0);
     }
     ASSERT_EQ(of.found(), of.all(false)) << step;

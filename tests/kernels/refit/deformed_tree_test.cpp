@@ -12,7 +12,8 @@ namespace tandem::test {
 namespace {
 
 struct Refittable {
-  explicit Refittable(const Mesh& mesh) : file(make_refittable_file(mesh)), view(file.check().asset), rest(view.level()) {}
+  explicit Refittable(const Mesh& mesh)
+      : file(make_refittable_file(mesh)), view(file.check().asset), rest(view.level()) {}
   Bytes file;
   AssetView view;
   LevelView rest;
@@ -35,7 +36,8 @@ void expect_sound(const LevelView& rest, const LevelView& level) {
         ASSERT_TRUE(is_imaginary_box(box)) << b;
       } else if (block.kind[i] == NodeKind::leaf) {
         const Triangle& triangle = level.triangles[block.index[i]];
-        for (const auto& corner : triangle.corner) ASSERT_TRUE(contains(box, corner.position)) << b << " " << i;
+        for (const auto& corner : triangle.corner)
+          ASSERT_TRUE(contains(box, corner.position)) << b << " " << i;
       } else {
         const Block& child = level.blocks[block.index[i]];
         for (int j = 0; j < kNodesPerBlock && child.kind[j] != NodeKind::imaginary; ++j)
@@ -112,7 +114,8 @@ TEST(DeformedTree, ContainsTrianglesOfAnyFiniteCoordinates) {
       do {
         const auto bits = static_cast<std::uint32_t>(random.engine()());
         std::memcpy(&x, &bits, sizeof x);
-        if (step % 3 == 0) x = std::ldexp(1 + static_cast<float>(bits % 8) * 0x1p-23f, static_cast<int>(bits >> 8) % 26);
+        if (step % 3 == 0)
+          x = std::ldexp(1 + static_cast<float>(bits % 8) * 0x1p-23f, static_cast<int>(bits >> 8) % 26);
       } while (!(std::fabs(x) <= kMaxCoordinate));
     }
     ASSERT_EQ(tree.refit(positions), Status::kOk);
@@ -133,7 +136,8 @@ TEST(DeformedTree, AllWaysWriteTheSameBytes) {
       for (int step = 0; step < 20 && way != nullptr; ++step) {
         const std::vector<float> positions = single(
             bent(kBends[random.below(std::size(kBends))], random.symmetric(4), positions_of(mesh), random));
-        const RefitSurfaces x = of[0].refit_by(way, positions.data()), y = of[1].refit_by(scalar, positions.data());
+        const RefitSurfaces x = of[0].refit_by(way, positions.data()),
+                            y = of[1].refit_by(scalar, positions.data());
         ASSERT_TRUE(same(of[0].level(), of[1].level()));
         ASSERT_TRUE(x.of_inner == y.of_inner && x.of_leaves == y.of_leaves);
       }

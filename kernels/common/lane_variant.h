@@ -16,6 +16,7 @@ struct ManifoldLanes;
 struct LaneVariant {
   BlockPairTest block_pair_test;
   bool (*narrow_phase)(const PairTask&, ContactSink&);
+  bool (*narrow_phase_without_neighbours)(const PairTask&, ContactSink&);
   void (*nearest_phase)(const NearestTask&, const BoundedBlockPair*, std::uint32_t, NearestSoFar&);
   const ManifoldLanes* manifold_lanes;
 };

@@ -38,10 +38,11 @@ class ContactFinder {
   static bool grow_contacts(ContactSink& sink);
   bool provide_workers(const SceneState& scene);
   PairTask task_of(std::uint32_t pair) const;
+  template <bool kWithoutNeighbours>
   void work(std::uint32_t worker);
   Status collect(SceneState& scene, Buffer<Contact>& contacts, ContactCounters& counters);
 
-  NarrowPhase in_frame_, by_world_boxes_;  // of this call
+  NarrowPhase narrow_phase_ = nullptr;  // of this call
   std::span<const PosedTree> trees_;
   std::span<const ObjectPair> pairs_;
   std::span<const Neighbourhood> neighbours_;

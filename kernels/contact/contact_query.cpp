@@ -53,14 +53,15 @@ PairTask ContactFinder::task_of(std::uint32_t pair) const {
   task.pair = pair;
   task.mode = options_.mode;
   task.first_contact_only = options_.first_contact_only;
-  if (task.self && !neighbours_.empty()) task.neighbours = &neighbours_[pairs_[pair].a];
   if (task.first_contact_only && task.in_frame && !task.self && task.within > 0)
     task.most_candidates =
         std::max(kLeastBeforeGivingUp, std::uint64_t{a.tree.triangle_count} + b.tree.triangle_count);
   return task;
 }
 
-// Takes chunks of pairs until none is left.
+// Takes chunks of pairs until none is left. A call that leaves out nothing has code of its own, which does
+// not ask.
+template <bool kWithoutNeighbours>
 void ContactFinder::work(std::uint32_t worker) {
   Worker& self = workers_[worker];
   ContactSink sink;
@@ -75,9 +76,12 @@ void ContactFinder::work(std::uint32_t worker) {
     const std::size_t begin = used(), first = chunk * pairs_in_chunk_;
     const std::size_t end = std::min(pairs_.size(), first + pairs_in_chunk_);
     for (std::size_t pair = first; pair < end && self.enough_memory; ++pair) {
-      const PairTask task = task_of(static_cast<std::uint32_t>(pair));
+      PairTask task = task_of(static_cast<std::uint32_t>(pair));
+      if constexpr (kWithoutNeighbours) {
+        if (task.self) task.neighbours = &neighbours_[pairs_[pair].a];
+      }
       sink.gave_up = false;
-      self.enough_memory = (task.in_frame ? in_frame_ : by_world_boxes_)(task, sink);
+      self.enough_memory = (task.in_frame ? narrow_phase_ : narrow_phase_by_world_boxes)(task, sink);
       if (sink.gave_up) self.enough_memory = find_first_within(task, sink, self.waiting);
     }
     chunks_[chunk] = {worker, begin, used(), 0};
@@ -131,8 +135,7 @@ Status ContactFinder::find(SceneState& scene, std::span<const PosedTree> trees,
                            Buffer<Contact>& contacts, ContactCounters& counters,
                            std::span<const Neighbourhood> neighbours) {
   const bool leaves_out = !neighbours.empty();
-  in_frame_ = best_way(leaves_out ? narrow_phase_without_neighbours : narrow_phase);
-  by_world_boxes_ = leaves_out ? narrow_phase_by_world_boxes_without_neighbours : narrow_phase_by_world_boxes;
+  narrow_phase_ = best_way(leaves_out ? narrow_phase_without_neighbours : narrow_phase);
   trees_ = trees;
   pairs_ = pairs;
   neighbours_ = neighbours;
@@ -142,9 +145,12 @@ Status ContactFinder::find(SceneState& scene, std::span<const PosedTree> trees,
   if (!scene.threads.provide(active_workers_)) return scene.fail(Status::kCannotStartThread, 0);
   next_chunk_.store(0, std::memory_order_relaxed);
   const auto work = [](void* finder, std::uint32_t worker) {
-    static_cast<ContactFinder*>(finder)->work(worker);
+    static_cast<ContactFinder*>(finder)->work<false>(worker);
   };
-  scene.threads.run(active_workers_, work, this);
+  const auto work_without_neighbours = [](void* finder, std::uint32_t worker) {
+    static_cast<ContactFinder*>(finder)->work<true>(worker);
+  };
+  scene.threads.run(active_workers_, leaves_out ? +work_without_neighbours : +work, this);
   return collect(scene, contacts, counters);
 }
 

@@ -109,9 +109,8 @@ bool are_within(const PairTask& task, const TrianglePair& pair, ContactCounters&
   return decide_exact(pair) == Verdict::contact || exact::are_within(pair, task.within);
 }
 
-template <bool kWithoutNeighbours>
 bool narrow_phase_scalar(const PairTask& task, ContactSink& sink) {
-  return PairWalk<ScalarMeans, kWithoutNeighbours>(task, sink).run();
+  return PairWalk<ScalarMeans, true>(task, sink).run();
 }
 
 }  // namespace
@@ -149,19 +148,15 @@ bool meet(const PairTask& task, std::uint32_t triangle_a, std::uint32_t triangle
 }
 
 bool narrow_phase_by_world_boxes(const PairTask& task, ContactSink& sink) {
-  return PairWalk<WorldBoxMeans>(task, sink).run();
-}
-
-bool narrow_phase_by_world_boxes_without_neighbours(const PairTask& task, ContactSink& sink) {
   return PairWalk<WorldBoxMeans, true>(task, sink).run();
 }
 
 NarrowPhase narrow_phase(BlockPairVariant variant) {
-  return way_of(variant, narrow_phase_scalar<false>, &LaneVariant::narrow_phase);
+  return way_of(variant, narrow_phase_scalar, &LaneVariant::narrow_phase);
 }
 
 NarrowPhase narrow_phase_without_neighbours(BlockPairVariant variant) {
-  return way_of(variant, narrow_phase_scalar<true>, &LaneVariant::narrow_phase_without_neighbours);
+  return way_of(variant, narrow_phase_scalar, &LaneVariant::narrow_phase_without_neighbours);
 }
 
 }  // namespace tandem

@@ -56,10 +56,9 @@ NarrowPhase narrow_phase(BlockPairVariant variant);
 /// As narrow_phase(), but leaves out task.neighbours: they are no candidates.
 NarrowPhase narrow_phase_without_neighbours(BlockPairVariant variant);
 
-/// Walks pairs that are not in_frame by the boxes of nodes in world coordinates, float64. It is slow, and
-/// right for all posed points that are finite.
+/// Walks pairs that are not in_frame by the boxes of nodes in world coordinates, float64, and leaves out
+/// task.neighbours. It is slow, and right for all posed points that are finite.
 bool narrow_phase_by_world_boxes(const PairTask& task, ContactSink& sink);
-bool narrow_phase_by_world_boxes_without_neighbours(const PairTask& task, ContactSink& sink);
 
 /// Decides what the first stage left, on the posed vertices, by float64, then exactly. In fast mode, by
 /// float32 in a's frame. Where task.within is not 0, whether they are within it, in any mode.

@@ -24,8 +24,8 @@ class NeighbourLists {
   /// Finds the number of the mesh with this topology; kNoIndex where it was not added.
   std::uint32_t find(const TriangleTopology* topology) const;
 
-  /// Adds the mesh of a level. readable: its topology in CPU memory. Result: false where memory is out, or the
-  /// mesh has 2^32 pairs of vertices or more within the rings; then nothing was added.
+  /// Adds the mesh of a level. readable: its topology in CPU memory. Result: false where memory is out, or
+  /// the mesh has 2^32 pairs of vertices or more within the rings; then nothing was added.
   [[nodiscard]] bool add(const LevelView& level, const TriangleTopology* readable);
 
   std::span<const std::uint32_t> first() const { return first_.view(); }    ///< of all meshes

@@ -23,11 +23,10 @@ struct Neighbourhood {
 namespace {
 
 TANDEM_HD inline bool share_vertex(const TriangleTopology& x, const TriangleTopology& y) {
-  bool shared = false;
-  for (const std::uint32_t u : x.vertex) {
-    for (const std::uint32_t v : y.vertex) shared |= u == v;
-  }
-  return shared;
+  const auto is_of_y = [&](std::uint32_t u) {
+    return (u == y.vertex[0]) | (u == y.vertex[1]) | (u == y.vertex[2]);
+  };
+  return is_of_y(x.vertex[0]) | is_of_y(x.vertex[1]) | is_of_y(x.vertex[2]);
 }
 
 /// Returns whether a path of at most n - 1 edges joins two different vertices. Condition: n > 1.

@@ -50,8 +50,8 @@ Mesh crossing_sheet() {
 Mesh fan(std::uint32_t count, float turns) {
   Mesh mesh;
   const auto rim = [&](std::uint32_t i) {
-    const float angle = turns * 2 * std::numbers::pi_v<float> * static_cast<float>(i) /
-                        static_cast<float>(count);
+    const float angle =
+        turns * 2 * std::numbers::pi_v<float> * static_cast<float>(i) / static_cast<float>(count);
     return std::array<float, 3>{std::cos(angle), std::sin(angle), 0};
   };
   for (std::uint32_t i = 0; i < count; ++i) mesh.add({0, 0, 0}, rim(i), rim(i + 1));
@@ -63,10 +63,14 @@ Mesh book(std::uint32_t pages) {
   Mesh mesh;
   for (std::uint32_t page = 0; page < pages; ++page) {
     const float angle = 0.4f * static_cast<float>(page);
-    append(mesh, grid(3, 4, [&](std::uint32_t c, std::uint32_t r) {
-             const auto out = static_cast<float>(c);
-             return std::array<float, 3>{out * std::cos(angle), out * std::sin(angle), static_cast<float>(r)};
-           }), {0, 0, 0});
+    append(mesh,
+           grid(3, 4,
+                [&](std::uint32_t c, std::uint32_t r) {
+                  const auto out = static_cast<float>(c);
+                  return std::array<float, 3>{out * std::cos(angle), out * std::sin(angle),
+                                              static_cast<float>(r)};
+                }),
+           {0, 0, 0});
   }
   return mesh;
 }

@@ -31,7 +31,8 @@ class NeighbourReference {
  public:
   explicit NeighbourReference(const Mesh& mesh);
 
-  /// The least n so that the triangles are neighbours within n rings; a large number where no path joins them.
+  /// The least n so that the triangles are neighbours within n rings; a large number where no path joins
+  /// them.
   std::uint32_t rings_between(std::uint32_t x, std::uint32_t y) const;
 
  private:

@@ -75,3 +75,18 @@ def about(axis, degrees):
     i, j = (axis + 1) % 3, (axis + 2) % 3
     rotation[[i, i, j, j], [i, j, i, j]] = c, -s, s, c
     return rotation
+
+
+def joined(meshes):
+    """Several meshes as one."""
+    firsts = np.cumsum([0] + [len(vertices) for vertices, _ in meshes])
+    return np.concatenate([vertices for vertices, _ in meshes]), np.concatenate([faces + first for first, (_, faces) in zip(firsts, meshes)])
+
+
+def sheet(width, height, cells_across, cells_up):
+    """An open rectangle in the plane x = 0, about the z axis and above z = 0."""
+    across, up = np.meshgrid(np.linspace(-0.5, 0.5, cells_across + 1) * width, np.linspace(0, 1, cells_up + 1) * height)
+    vertices = np.stack([0 * across, across, up], -1).reshape(-1, 3)
+    a = (np.arange(cells_up)[:, None] * (cells_across + 1) + np.arange(cells_across)).reshape(-1)
+    b, c, d = a + 1, a + cells_across + 2, a + cells_across + 1
+    return vertices, np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])

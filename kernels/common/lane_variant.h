@@ -18,6 +18,7 @@ struct RefitSurfaces;
 struct LaneVariant {
   BlockPairTest block_pair_test;
   bool (*narrow_phase)(const PairTask&, ContactSink&);
+  bool (*narrow_phase_without_neighbours)(const PairTask&, ContactSink&);
   void (*nearest_phase)(const NearestTask&, const BoundedBlockPair*, std::uint32_t, NearestSoFar&);
   const ManifoldLanes* manifold_lanes;
   RefitSurfaces (*refit)(const RefitTree&, const float*);

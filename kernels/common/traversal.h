@@ -154,9 +154,11 @@ void descend_b(Stack& stack, const BlockPair& pair, const AnyBlock& b, std::uint
   }
 }
 
-/// The block pairs below one that hits, not both of whose blocks are leaf blocks.
+/// The block pairs below one that hits, not both of whose blocks are leaf blocks. Compilers are told to
+/// inline it: GCC stops doing so by itself where a file has several walks, which takes 2 % more instructions.
 template <typename Stack, typename AnyBlock>
-void descend(Stack& stack, const BlockPair& pair, const AnyBlock& a, const AnyBlock& b, std::uint32_t hits) {
+[[gnu::always_inline]] inline void descend(Stack& stack, const BlockPair& pair, const AnyBlock& a,
+                                           const AnyBlock& b, std::uint32_t hits) {
   const bool leaf_a = a.is_leaf_block();
   const Descent descent = leaf_a != b.is_leaf_block()
                               ? descent_beside_leaves(leaf_a)

@@ -12,12 +12,12 @@ namespace tandem {
 /// call to call.
 class ContactFinder {
  public:
-  ContactFinder();
-
-  /// trees: by the numbers that `pairs` name; contacts, counters: what is found. Result: kOk, kOutOfMemory or
-  /// kCannotStartThread.
+  /// trees: by the numbers that `pairs` name; contacts, counters: what is found. neighbours: what is left out
+  /// of each tree, by the same numbers, where a pair is of a tree with itself; empty: nothing. Result: kOk,
+  /// kOutOfMemory or kCannotStartThread.
   Status find(SceneState& scene, std::span<const PosedTree> trees, std::span<const ObjectPair> pairs,
-              const ContactOptions& options, Buffer<Contact>& contacts, ContactCounters& counters);
+              const ContactOptions& options, Buffer<Contact>& contacts, ContactCounters& counters,
+              std::span<const Neighbourhood> neighbours = {});
 
  private:
   // The contacts of one chunk of pairs within those of the worker that took it.
@@ -38,12 +38,14 @@ class ContactFinder {
   static bool grow_contacts(ContactSink& sink);
   bool provide_workers(const SceneState& scene);
   PairTask task_of(std::uint32_t pair) const;
+  template <bool kWithoutNeighbours>
   void work(std::uint32_t worker);
   Status collect(SceneState& scene, Buffer<Contact>& contacts, ContactCounters& counters);
 
-  NarrowPhase narrow_phase_;
+  NarrowPhase narrow_phase_ = nullptr;  // of this call
   std::span<const PosedTree> trees_;
   std::span<const ObjectPair> pairs_;
+  std::span<const Neighbourhood> neighbours_;
   ContactOptions options_;
   PerWorker<Worker> workers_;
   std::uint32_t active_workers_ = 0;  // in this call

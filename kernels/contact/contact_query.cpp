@@ -4,6 +4,7 @@
 
 #include "kernels/common/block_pair.h"
 #include "kernels/common/check_options.h"
+#include "kernels/contact/neighbour_lists.h"
 #include "kernels/geometry/level_error.h"
 #include "tandem/kernels/contact_query.h"
 
@@ -17,8 +18,6 @@ constexpr std::size_t kMostPairsInChunk = 16, kChunksForEach = 32;
 constexpr std::size_t kChunksAtOnce = 8;
 
 }  // namespace
-
-ContactFinder::ContactFinder() : narrow_phase_(best_way(narrow_phase)) {}
 
 bool ContactFinder::grow_contacts(ContactSink& sink) {
   Worker& owner = *static_cast<Worker*>(sink.owner);
@@ -60,7 +59,9 @@ PairTask ContactFinder::task_of(std::uint32_t pair) const {
   return task;
 }
 
-// Takes chunks of pairs until none is left.
+// Takes chunks of pairs until none is left. A call that leaves out nothing has code of its own, which does
+// not ask.
+template <bool kWithoutNeighbours>
 void ContactFinder::work(std::uint32_t worker) {
   Worker& self = workers_[worker];
   ContactSink sink;
@@ -75,7 +76,10 @@ void ContactFinder::work(std::uint32_t worker) {
     const std::size_t begin = used(), first = chunk * pairs_in_chunk_;
     const std::size_t end = std::min(pairs_.size(), first + pairs_in_chunk_);
     for (std::size_t pair = first; pair < end && self.enough_memory; ++pair) {
-      const PairTask task = task_of(static_cast<std::uint32_t>(pair));
+      PairTask task = task_of(static_cast<std::uint32_t>(pair));
+      if constexpr (kWithoutNeighbours) {
+        if (task.self) task.neighbours = &neighbours_[pairs_[pair].a];
+      }
       sink.gave_up = false;
       self.enough_memory = (task.in_frame ? narrow_phase_ : narrow_phase_by_world_boxes)(task, sink);
       if (sink.gave_up) self.enough_memory = find_first_within(task, sink, self.waiting);
@@ -128,35 +132,62 @@ Status ContactFinder::collect(SceneState& scene, Buffer<Contact>& contacts, Cont
 // A query with error bounds proves something, so it is decided exactly in mode fast too.
 Status ContactFinder::find(SceneState& scene, std::span<const PosedTree> trees,
                            std::span<const ObjectPair> pairs, const ContactOptions& options,
-                           Buffer<Contact>& contacts, ContactCounters& counters) {
+                           Buffer<Contact>& contacts, ContactCounters& counters,
+                           std::span<const Neighbourhood> neighbours) {
+  const bool leaves_out = !neighbours.empty();
+  narrow_phase_ = best_way(leaves_out ? narrow_phase_without_neighbours : narrow_phase);
   trees_ = trees;
   pairs_ = pairs;
+  neighbours_ = neighbours;
   options_ = options;
   if (options.add_error_bounds && options.mode == QueryMode::fast) options_.mode = QueryMode::exact;
   if (!provide_workers(scene)) return scene.fail(Status::kOutOfMemory, 0);
   if (!scene.threads.provide(active_workers_)) return scene.fail(Status::kCannotStartThread, 0);
   next_chunk_.store(0, std::memory_order_relaxed);
   const auto work = [](void* finder, std::uint32_t worker) {
-    static_cast<ContactFinder*>(finder)->work(worker);
+    static_cast<ContactFinder*>(finder)->work<false>(worker);
   };
-  scene.threads.run(active_workers_, work, this);
+  const auto work_without_neighbours = [](void* finder, std::uint32_t worker) {
+    static_cast<ContactFinder*>(finder)->work<true>(worker);
+  };
+  scene.threads.run(active_workers_, leaves_out ? +work_without_neighbours : +work, this);
   return collect(scene, contacts, counters);
 }
 
+namespace {
+
+// Result: kOk, or kNoTopology where a body that is to meet itself has none.
+Status require_topology_of_selves(SceneState& scene, std::span<const ObjectPair> pairs) {
+  for (const ObjectPair& pair : pairs) {
+    if (pair.a == pair.b && scene.bodies[pair.a].tree.topology == nullptr)
+      return scene.fail(Status::kNoTopology, scene.instances[pair.a].asset);
+  }
+  return Status::kOk;
+}
+
+}  // namespace
+
 struct ContactQuery::State : Allocated {
   ContactFinder finder;
+  BodyNeighbours neighbours;
 };
 
 Status ContactQuery::answer(SceneState& scene, const std::span<const ObjectPair>* given,
                             const ContactOptions& options) {
-  Status status = check_within(options.within);
+  const std::uint32_t rings = options.leave_out_rings;
+  Status status = check_contact_options(options.within, rings);
   if (status != Status::kOk) return scene.fail(status, 0);
   status = scene.take_or_find_pairs(given, options.within, options.self_pairs, pairs_);
+  if (status == Status::kOk && rings > 0) status = require_topology_of_selves(scene, pairs_.view());
   if (status != Status::kOk) return status;
   if (scene.device != nullptr) return scene.ask_device(options, found());
   State* const state = state_.provide();
   if (state == nullptr) return scene.fail(Status::kOutOfMemory, 0);
-  return state->finder.find(scene, scene.bodies.view(), pairs_.view(), options, rows_, counters_);
+  if (rings > 0) status = state->neighbours.provide(scene, pairs_.view(), rings);
+  if (status != Status::kOk) return status;
+  const std::span<const Neighbourhood> left_out =
+      rings > 0 ? state->neighbours.view() : std::span<const Neighbourhood>();
+  return state->finder.find(scene, scene.bodies.view(), pairs_.view(), options, rows_, counters_, left_out);
 }
 
 }  // namespace tandem

@@ -110,7 +110,7 @@ bool are_within(const PairTask& task, const TrianglePair& pair, ContactCounters&
 }
 
 bool narrow_phase_scalar(const PairTask& task, ContactSink& sink) {
-  return PairWalk<ScalarMeans>(task, sink).run();
+  return PairWalk<ScalarMeans, true>(task, sink).run();
 }
 
 }  // namespace
@@ -149,11 +149,15 @@ bool meet(const PairTask& task, std::uint32_t triangle_a, std::uint32_t triangle
 }
 
 bool narrow_phase_by_world_boxes(const PairTask& task, ContactSink& sink) {
-  return PairWalk<WorldBoxMeans>(task, sink).run();
+  return PairWalk<WorldBoxMeans, true>(task, sink).run();
 }
 
 NarrowPhase narrow_phase(BlockPairVariant variant) {
   return way_of(variant, narrow_phase_scalar, &LaneVariant::narrow_phase);
+}
+
+NarrowPhase narrow_phase_without_neighbours(BlockPairVariant variant) {
+  return way_of(variant, narrow_phase_scalar, &LaneVariant::narrow_phase_without_neighbours);
 }
 
 }  // namespace tandem

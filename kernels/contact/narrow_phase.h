@@ -4,6 +4,7 @@
 
 #include "kernels/common/block_pair.h"
 #include "kernels/common/lane_variant.h"
+#include "kernels/contact/neighbours.h"
 #include "kernels/geometry/frame_distance.h"
 #include "kernels/geometry/relative_pose.h"
 #include "kernels/scene/scene_state.h"
@@ -27,6 +28,9 @@ struct PairTask {
   double within = 0;      ///< triangles at most so far apart count; 0: those that meet
   distance::FrameClearance clearance = {};            ///< where that is not 0
   std::uint64_t most_candidates = ~std::uint64_t{0};  ///< of clearance: the walk gives up after so many
+  /// Where both are one instance, the neighbours that the ways without neighbours leave out; null: none.
+  /// Other ways do not look at it.
+  const Neighbourhood* neighbours = nullptr;
 };
 
 /// Returns the task of these two, or of one instance with itself. The caller sets what else is asked.
@@ -49,8 +53,11 @@ using NarrowPhase = bool (*)(const PairTask&, ContactSink&);
 /// order, and the same counters. Condition: task.in_frame.
 NarrowPhase narrow_phase(BlockPairVariant variant);
 
-/// Walks pairs that are not in_frame by the boxes of nodes in world coordinates, float64. It is slow, and
-/// right for all posed points that are finite.
+/// As narrow_phase(), but leaves out task.neighbours: they are no candidates.
+NarrowPhase narrow_phase_without_neighbours(BlockPairVariant variant);
+
+/// Walks pairs that are not in_frame by the boxes of nodes in world coordinates, float64, and leaves out
+/// task.neighbours. It is slow, and right for all posed points that are finite.
 bool narrow_phase_by_world_boxes(const PairTask& task, ContactSink& sink);
 
 /// Decides what the first stage left, on the posed vertices, by float64, then exactly. In fast mode, by

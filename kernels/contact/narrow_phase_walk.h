@@ -1,6 +1,7 @@
 #pragma once
 #include "kernels/contact/candidate.h"
 #include "kernels/contact/narrow_phase.h"
+#include "kernels/contact/neighbours.h"
 #include "kernels/geometry/grid_test.h"
 
 // The walk that all variants of the narrow phase share. Included by files that are compiled for different
@@ -66,7 +67,10 @@ constexpr std::uint32_t column(std::uint32_t four, int j) {
 /// drop_beyond_planes(a, b, hits), see leaf_planes.h; append(candidates, a, b, hits); decide(candidates),
 /// the verdicts on the first kBatch candidates, any where there are fewer; and of clearance, as it is dearer,
 /// in two steps: sift(candidates), and decide_within(candidates) on those that it leaves.
-template <typename Means>
+///
+/// kWithoutNeighbours: neighbours are left out as soon as their leaf blocks meet, which takes less than any
+/// test of two triangles. Other walks are compiled without this question.
+template <typename Means, bool kWithoutNeighbours = false>
 class PairWalk {
  public:
   PairWalk(const PairTask& task, ContactSink& sink) : task_(task), sink_(sink), means_(task) {}
@@ -77,6 +81,10 @@ class PairWalk {
       return task_.self && &a == &b ? hits & own_node_pairs(a.is_leaf_block()) : hits;
     };
     const auto on_leaves = [this](const Block& a, const Block& b, std::uint32_t hits) {
+      if constexpr (kWithoutNeighbours) {
+        if (task_.neighbours != nullptr)
+          hits = drop_neighbours(*task_.neighbours, a.index[0], b.index[0], hits);
+      }
       means_.append(candidates_, a, b, hits);
       return candidates_.count < kBatch || settle(kBatch);
     };

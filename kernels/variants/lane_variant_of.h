@@ -16,9 +16,9 @@ std::uint16_t block_pair_mask_of_lanes(const Block& a, const Block& b, const Rel
   return static_cast<std::uint16_t>(BlockPairLanes<kCount>(a, b, b_in_a).mask());
 }
 
-template <int kCount>
+template <int kCount, bool kWithoutNeighbours>
 bool narrow_phase_of_lanes(const PairTask& task, ContactSink& sink) {
-  return PairWalk<LaneMeans<kCount>>(task, sink).run();
+  return PairWalk<LaneMeans<kCount>, kWithoutNeighbours>(task, sink).run();
 }
 
 template <int kCount>
@@ -32,9 +32,10 @@ constexpr ManifoldLanes kManifoldLanes = {make_pieces,        sum_pieces,   leas
                                           next_near,          answer_lines};
 
 template <int kCount>
-constexpr LaneVariant kLaneVariantOf = {block_pair_mask_of_lanes<kCount>, narrow_phase_of_lanes<kCount>,
-                                        nearest_phase_of_lanes<kCount>, &kManifoldLanes,
-                                        refit_of_lanes<kCount>};
+constexpr LaneVariant kLaneVariantOf = {
+    block_pair_mask_of_lanes<kCount>, narrow_phase_of_lanes<kCount, false>,
+    narrow_phase_of_lanes<kCount, true>, nearest_phase_of_lanes<kCount>, &kManifoldLanes,
+    refit_of_lanes<kCount>};
 
 }  // namespace
 }  // namespace tandem

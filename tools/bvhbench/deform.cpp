@@ -42,7 +42,8 @@ class Follower {
  public:
   Follower(const BendingScene& scene, const DeformOptions& options, std::string_view engine)
       : scene_(scene), options_(options), own_(engine == "tandem") {
-    engine_ = make_engine(engine, ContactOptions{.self_pairs = options.self_pairs});
+    engine_ = make_engine(
+        engine, ContactOptions{.self_pairs = options.self_pairs, .leave_out_rings = options.leave_out_rings});
     engine_->set_threads(options.threads);
     engine_->set_filter(scene.filter);
     place(scene.shapes);
@@ -119,8 +120,7 @@ class Rebuilder {
 
   // A file holds float32 numbers: where positions are others, the new trees are refitted to these. Result:
   // nothing where a shape has no triangle left.
-  std::optional<FrameWork> work(const Frame& frame, std::uint32_t number,
-                                std::span<const ObjectPair> pairs) {
+  std::optional<FrameWork> work(const Frame& frame, std::uint32_t number, std::span<const ObjectPair> pairs) {
     FrameWork work;
     bool has_trees = true;
     work.update_seconds = seconds_by(options_.threads, [&] { has_trees = build(frame); });
@@ -137,7 +137,8 @@ class Rebuilder {
 
   // Throws where the contacts are others than those of the refitted trees.
   void compare(const Follower& refitted, std::uint32_t number) const {
-    const std::vector<BodyContact> expected = normalised(refitted, false), found = normalised(follower_, true);
+    const std::vector<BodyContact> expected = normalised(refitted, false),
+                                   found = normalised(follower_, true);
     if (expected == found) return;
     const auto count_missing = [](const auto& some, const auto& all) {
       std::vector<BodyContact> missing;

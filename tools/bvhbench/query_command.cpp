@@ -15,6 +15,7 @@ struct QueryArguments : CommonArguments {
   std::string gpu_engine = "tandem-cuda";
   QueryMode mode = QueryMode::exact;
   double within = 0;
+  std::uint32_t leave_out_rings = 0;
   std::optional<double> tolerance;
   std::optional<std::array<double, 3>> at;
   std::optional<double> kept_within;
@@ -97,6 +98,7 @@ Answer find(const QueryArguments& arguments, const LoadedScene& scene) {
   options.first_contact_only = arguments.first_contact;
   options.self_pairs = arguments.self_pairs;
   options.within = arguments.within;
+  options.leave_out_rings = arguments.leave_out_rings;
   const auto engine = make_engine(arguments.on_gpu() ? arguments.gpu_engine : "tandem", options);
   Answer answer;
   engine->set_threads(arguments.threads());
@@ -147,7 +149,8 @@ Report report_of(const QueryArguments& arguments, const LoadedScene& scene, cons
   report.add({{"mode", mode},
               {"first_contact", arguments.first_contact},
               {"self_pairs", arguments.self_pairs},
-              {"within", arguments.within}});
+              {"within", arguments.within},
+              {"leave_out_rings", arguments.leave_out_rings}});
   if (arguments.frame) report.add("frame", *arguments.frame);
   add_setting(report, arguments, scene);
   report["triangles"].row("triangles");
@@ -216,10 +219,10 @@ void check_options(const QueryArguments& arguments) {
     return;
   }
   if (!tandem && (arguments.first_contact || arguments.order() != OrderOnGpu::any || arguments.traversal ||
-                  arguments.manifolds || arguments.within > 0)) {
+                  arguments.manifolds || arguments.within > 0 || arguments.leave_out_rings > 0)) {
     throw UsageError(
-        "--first-contact, --grouped, --manifolds, --sorted, --traversal and --within are for the engine "
-        "tandem");
+        "--first-contact, --grouped, --leave-out-rings, --manifolds, --sorted, --traversal and --within are "
+        "for the engine tandem");
   }
   if (arguments.self_pairs)
     throw UsageError("--self is for the backend cpu; /pairs of a scene may name an instance twice");
@@ -228,7 +231,8 @@ void check_options(const QueryArguments& arguments) {
 // The command prints and writes rows about pairs of bodies here, so options of contacts do not go with it.
 ExitCode run_by_tolerance(const QueryArguments& arguments) {
   if (arguments.mode != QueryMode::exact || arguments.first_contact || arguments.within > 0 ||
-      arguments.self_pairs || arguments.frame || arguments.takes_all_contacts() || arguments.is_for_gpu()) {
+      arguments.self_pairs || arguments.leave_out_rings > 0 || arguments.frame ||
+      arguments.takes_all_contacts() || arguments.is_for_gpu()) {
     throw UsageError("--tolerance finds no contacts, so options that are about them do not go with it");
   }
   return run_tolerance(arguments, *arguments.tolerance);
@@ -262,30 +266,34 @@ void add_query(Command tool, Run& run_later) {
       tool, run_later, "query", "find every pair of triangles that meet in a scene", run_query);
   command.add({scene_argument(arguments), backend_option(arguments)});
   if (has_cuda()) add_gpu_options(command, arguments);
-  command.add({{"--mode", arguments.mode, kModes, "exact|fast|boxes [exact]",
-                "'exact' contacts, 'fast' ones by float32, or 'boxes': candidates"},
-               {"--first-contact", arguments.first_contact, "one contact for each object pair at most"},
-               {"--within", arguments.within, "D [0]",
-                "clearance: also triangles at most so far apart, decided exactly",
-                between(0, kLargestWorldCoordinate)},
-               {"--tolerance", arguments.tolerance, "T",
-                "only which bodies surely meet, which surely do not, and which are within T, by their levels",
-                between(0, kLargestWorldCoordinate)},
-               {"--manifolds", arguments.manifolds, "also contact manifolds: normals, depths and points"},
-               {"--keep", arguments.kept_within, "T",
-                "with --manifolds: also the time for bodies that stand still, whose pairs are kept within T",
-                between(0, kLargestWorldCoordinate)},
-               {"--contained", arguments.contained,
-                "also bodies that lie within others without touching them, found on the CPU"},
-               {"--at", arguments.at, "X Y Z", "also which bodies' world boxes contain this point",
-                between(-kLargestWorldCoordinate, kLargestWorldCoordinate)},
-               {"--self", arguments.self_pairs, "also each instance with itself"},
-               {"--frame", arguments.frame, "N", "of the scene's deformations; without it nothing bends",
-                between(0, 4e9)},
-               threads_option(arguments, "the contacts do"),
-               repeat_option(arguments),
-               output_option(arguments, "the contacts file to write; appears whole or not at all"),
-               json_option(arguments)});
+  command.add(
+      {{"--mode", arguments.mode, kModes, "exact|fast|boxes [exact]",
+        "'exact' contacts, 'fast' ones by float32, or 'boxes': candidates"},
+       {"--first-contact", arguments.first_contact, "one contact for each object pair at most"},
+       {"--within", arguments.within, "D [0]",
+        "clearance: also triangles at most so far apart, decided exactly",
+        between(0, kLargestWorldCoordinate)},
+       {"--tolerance", arguments.tolerance, "T",
+        "only which bodies surely meet, which surely do not, and which are within T, by their levels",
+        between(0, kLargestWorldCoordinate)},
+       {"--manifolds", arguments.manifolds, "also contact manifolds: normals, depths and points"},
+       {"--keep", arguments.kept_within, "T",
+        "with --manifolds: also the time for bodies that stand still, whose pairs are kept within T",
+        between(0, kLargestWorldCoordinate)},
+       {"--contained", arguments.contained,
+        "also bodies that lie within others without touching them, found on the CPU"},
+       {"--at", arguments.at, "X Y Z", "also which bodies' world boxes contain this point",
+        between(-kLargestWorldCoordinate, kLargestWorldCoordinate)},
+       {"--self", arguments.self_pairs, "also each instance with itself"},
+       {"--frame", arguments.frame, "N", "of the scene's deformations; without it nothing bends",
+        between(0, 4e9)},
+       {"--leave-out-rings", arguments.leave_out_rings, "N [0]",
+        "of an instance with itself: leave out triangles that share a vertex (1), or that N - 1 edges join",
+        between(0, kMostRings)},
+       threads_option(arguments, "the contacts do"),
+       repeat_option(arguments),
+       output_option(arguments, "the contacts file to write; appears whole or not at all"),
+       json_option(arguments)});
 }
 
 }  // namespace tandem::bench

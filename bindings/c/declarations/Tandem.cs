@@ -88,6 +88,7 @@ public unsafe struct tandem_asset_info {
   public ulong file_bytes;
   public ulong hash;
   public ulong source_faces;
+  public ulong source_vertices;
   public fixed double origin[3];
   public double rounding_error;
   public fixed float lower[3];
@@ -621,6 +622,10 @@ public static unsafe class Native {
   public const uint TANDEM_BAD_JOINT = 217;
   public const uint TANDEM_NO_AXIS = 218;
   public const uint TANDEM_JOINS_NOTHING = 219;
+  public const uint TANDEM_NO_SOURCE_VERTICES = 220;
+  public const uint TANDEM_VERTEX_COUNT_MISMATCH = 221;
+  public const uint TANDEM_DEFORMED = 222;
+  public const uint TANDEM_NOT_FLOAT32 = 223;
   public const uint TANDEM_NO_GPU = 300;
   public const uint TANDEM_DRIVER_TOO_OLD = 301;
   public const uint TANDEM_GPU_NOT_SUPPORTED = 302;
@@ -691,6 +696,9 @@ public static unsafe class Native {
   [DllImport("tandem")] public static extern void tandem_scene_destroy(IntPtr scene);
   [DllImport("tandem")] public static extern uint tandem_scene_set_threads(IntPtr scene, uint threads);
   [DllImport("tandem")] public static extern uint tandem_scene_set_assets(IntPtr scene, IntPtr* assets, UIntPtr count);
+  [DllImport("tandem")] public static extern uint tandem_scene_deform(IntPtr scene, uint asset, float* positions, UIntPtr vertex_count);
+  [DllImport("tandem")] public static extern uint tandem_scene_deform_f64(IntPtr scene, uint asset, double* positions, UIntPtr vertex_count);
+  [DllImport("tandem")] public static extern double tandem_scene_looseness(IntPtr scene, uint asset);
   [DllImport("tandem")] public static extern uint tandem_scene_place(IntPtr scene, tandem_instance* instances, UIntPtr count, tandem_pair_filter* filter);
   [DllImport("tandem")] public static extern uint tandem_scene_add(IntPtr scene, tandem_instance* instance, tandem_pair_filter* filter, uint* body);
   [DllImport("tandem")] public static extern uint tandem_scene_move(IntPtr scene, uint* bodies, tandem_pose* poses, UIntPtr count);

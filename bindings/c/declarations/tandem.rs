@@ -95,6 +95,10 @@ pub const TANDEM_NO_MASS: u32 = 216;
 pub const TANDEM_BAD_JOINT: u32 = 217;
 pub const TANDEM_NO_AXIS: u32 = 218;
 pub const TANDEM_JOINS_NOTHING: u32 = 219;
+pub const TANDEM_NO_SOURCE_VERTICES: u32 = 220;
+pub const TANDEM_VERTEX_COUNT_MISMATCH: u32 = 221;
+pub const TANDEM_DEFORMED: u32 = 222;
+pub const TANDEM_NOT_FLOAT32: u32 = 223;
 pub const TANDEM_NO_GPU: u32 = 300;
 pub const TANDEM_DRIVER_TOO_OLD: u32 = 301;
 pub const TANDEM_GPU_NOT_SUPPORTED: u32 = 302;
@@ -265,6 +269,7 @@ pub struct tandem_asset_info {
     pub file_bytes: u64,
     pub hash: u64,
     pub source_faces: u64,
+    pub source_vertices: u64,
     pub origin: [f64; 3],
     pub rounding_error: f64,
     pub lower: [f32; 3],
@@ -771,6 +776,9 @@ extern "C" {
     pub fn tandem_scene_destroy(scene: *mut tandem_scene);
     pub fn tandem_scene_set_threads(scene: *mut tandem_scene, threads: u32) -> tandem_status;
     pub fn tandem_scene_set_assets(scene: *mut tandem_scene, assets: *const *mut tandem_asset, count: usize) -> tandem_status;
+    pub fn tandem_scene_deform(scene: *mut tandem_scene, asset: u32, positions: *const f32, vertex_count: usize) -> tandem_status;
+    pub fn tandem_scene_deform_f64(scene: *mut tandem_scene, asset: u32, positions: *const f64, vertex_count: usize) -> tandem_status;
+    pub fn tandem_scene_looseness(scene: *const tandem_scene, asset: u32) -> f64;
     pub fn tandem_scene_place(scene: *mut tandem_scene, instances: *const tandem_instance, count: usize, filter: *const tandem_pair_filter) -> tandem_status;
     pub fn tandem_scene_add(scene: *mut tandem_scene, instance: *const tandem_instance, filter: *const tandem_pair_filter, body: *mut u32) -> tandem_status;
     pub fn tandem_scene_move(scene: *mut tandem_scene, bodies: *const u32, poses: *const tandem_pose, count: usize) -> tandem_status;

@@ -96,6 +96,7 @@ tandem_status tandem_asset_get_info(const tandem_asset* asset, tandem_asset_info
   filled.file_bytes = header.file_bytes;
   filled.hash = header.hash;
   filled.source_faces = header.source_faces;
+  filled.source_vertices = header.source_vertices;
   filled.rounding_error = header.rounding_error;
   std::copy_n(header.origin, 3, filled.origin);
   std::copy_n(header.lower, 3, filled.lower);

@@ -205,6 +205,16 @@ void copy_counters(const Asked<Query>& asked, Counters& counters) {
   if (asked.found) counters = std::bit_cast<Counters>(asked.query.counters());
 }
 
+template <typename Real>
+tandem_status deform(tandem_scene* scene, uint32_t asset, const Real* positions, size_t vertex_count) {
+  return enter(scene, [&](tandem_scene& self) -> tandem_status {
+    if (!is_there(positions, vertex_count)) return TANDEM_NULL_ARGUMENT;
+    const Status deformed = self.scene.deform(asset, std::span(positions, 3 * vertex_count));
+    if (deformed == Status::kOk) self.standing = Standing::none;
+    return self.told(deformed);
+  });
+}
+
 }  // namespace
 
 tandem_status tandem_scene_create(const tandem_allocator* allocator, tandem_scene** scene) {
@@ -255,6 +265,20 @@ tandem_status tandem_scene_set_assets(tandem_scene* scene, tandem_asset* const* 
     self.keep(nullptr);
     return status;
   });
+}
+
+tandem_status tandem_scene_deform(tandem_scene* scene, uint32_t asset, const float* positions,
+                                  size_t vertex_count) {
+  return deform(scene, asset, positions, vertex_count);
+}
+
+tandem_status tandem_scene_deform_f64(tandem_scene* scene, uint32_t asset, const double* positions,
+                                      size_t vertex_count) {
+  return deform(scene, asset, positions, vertex_count);
+}
+
+double tandem_scene_looseness(const tandem_scene* scene, uint32_t asset) {
+  return scene != nullptr ? scene->scene.looseness(asset) : 1;
 }
 
 tandem_status tandem_scene_place(tandem_scene* scene, const tandem_instance* instances, size_t count,

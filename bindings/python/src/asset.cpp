@@ -56,8 +56,8 @@ nb::tuple info(const Asset& asset) {
   check(tandem_asset_get_info(asset.get(), &of));
   const auto three = [](const auto* v) { return nb::make_tuple(double{v[0]}, double{v[1]}, double{v[2]}); };
   return nb::make_tuple(of.level_count, of.first_level, of.part_count, of.file_bytes, of.hash,
-                        of.source_faces, three(of.origin), of.rounding_error, three(of.lower),
-                        three(of.upper));
+                        of.source_faces, of.source_vertices, three(of.origin), of.rounding_error,
+                        three(of.lower), three(of.upper));
 }
 
 // Returns the fields of tandem.Level in their order.

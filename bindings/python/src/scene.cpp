@@ -41,6 +41,19 @@ class Scene {
     ask([&](tandem_scene* scene) { return tandem_scene_set_threads(scene, threads); });
   }
 
+  // positions: contiguous, float32 or float64.
+  void deform(std::uint32_t asset, nb::handle positions, bool in_float64) {
+    const auto of = [&](auto function, const auto& numbers) {
+      change([&](tandem_scene* scene) { return function(scene, asset, numbers.data(), numbers.size() / 3); });
+    };
+    if (in_float64)
+      of(tandem_scene_deform_f64, copy_rows<double>(positions));
+    else
+      of(tandem_scene_deform, copy_rows<float>(positions));
+  }
+
+  double looseness(std::uint32_t asset) const { return tandem_scene_looseness(scene_.get(), asset); }
+
   void place(nb::handle instances, const Filter* filter) {
     const auto rows = copy_rows<tandem_instance>(instances);
     change([&](tandem_scene* scene) {
@@ -256,6 +269,8 @@ void add_scenes(nb::module_& module) {
   nb::class_<Scene>(module, "Scene")
       .def(nb::init<nb::list, std::uintptr_t>())
       .def("set_threads", &Scene::set_threads)
+      .def("deform", &Scene::deform)
+      .def("looseness", &Scene::looseness)
       .def("place", &Scene::place, nb::arg(), none())
       .def("add", &Scene::add, nb::arg(), none())
       .def("move", &Scene::move)

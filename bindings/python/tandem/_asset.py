@@ -60,6 +60,7 @@ class Info(NamedTuple):
     file_bytes: int
     hash: int
     source_faces: int
+    source_vertices: int
     origin: tuple[float, float, float]
     rounding_error: float
     lower: tuple[float, float, float]
@@ -232,6 +233,11 @@ class Asset(NotNumbers):
         return self._info.source_faces
 
     @property
+    def source_vertices(self) -> int:
+        """Vertices of the mesh file, of which each has a row in `Scene.deform`; 0: the asset cannot be deformed."""
+        return self._info.source_vertices
+
+    @property
     def parts(self) -> list[Part]:
         """The objects, groups or scene nodes that the mesh file names."""
         found = (self._core.part(part) for part in range(self._info.part_count))
@@ -258,7 +264,7 @@ class Asset(NotNumbers):
         return {"version": f"{major}.{minor}", "hash": self.hash, "bytes": self.file_bytes, **dict(zip(_TREE, tree)), **dict(zip(_WORK, measured[0][1])),
                 "surface": None if surface is None else dict(zip(_SURFACE, surface)),
                 "bounds": {"lower": list(lower), "upper": list(upper)}, "origin": list(self._info.origin), "rounding_error": self.rounding_error,
-                "source_faces": self.source_faces, "source": self.provenance, "parts": [part._asdict() for part in self.parts], "levels": levels,
+                "source_faces": self.source_faces, "source_vertices": self.source_vertices, "source": self.provenance, "parts": [part._asdict() for part in self.parts], "levels": levels,
                 "sections": sections}
 
 

@@ -284,6 +284,38 @@ class Scene:
         except Error as error:
             raise explained(error, poses) from None
 
+    def deform(self, asset: int, positions: npt.ArrayLike) -> None:
+        """Gives the vertices of an asset other positions, as often as you like: all its bodies take the shape of the triangles between these.
+
+        Questions are then about these positions, posed as usual, and decide as exactly as for rigid bodies. `verdicts` is not offered then, nor, where some
+        coordinate is no float32 number, are `manifolds`, `contained` and `impacts`.
+
+        Args:
+            asset: its place in the list that the scene was made of. A body that bends alone gets an entry of its own there: list the asset twice.
+            positions: (n, 3), a row for each vertex of the mesh that the asset was built from (`Asset.source_vertices`), in its coordinates. float32 and float64
+                arrays are taken as they are.
+
+        Raises:
+            Error: an asset that there is not, or that says nothing of its vertices (`bvhbuild --no-refit`); another number of positions; or one that is NaN or too
+                large: `where` is its row. Nothing has changed then.
+
+        >>> vertices = np.array([[0, 0, 0], [3, 0, 0], [0, 3, 0]])
+        >>> sheet = tandem.build(vertices, [[0, 1, 2]])
+        >>> scene = tandem.Scene([sheet, sheet], asset=[0, 1], translation=[[0, 0, 0], [0, 0, 1]])
+        >>> scene.deform(0, vertices + [[0, 0, 0], [0, 0, 0], [0, 0, 2]])
+        >>> scene.contacts().touching.tolist()
+        [(0, 1)]
+        """
+        array = floats(positions, "positions", 3) if np.asarray(positions).dtype != np.float32 else np.ascontiguousarray(positions)
+        if array.ndim != 2 or array.shape[1] != 3:
+            raise ValueError(f"positions has shape {array.shape} where (n, 3) is wanted")
+        self._core.deform(whole_number(asset, "asset", 0, _MOST), array, array.dtype == np.float64)
+
+    def looseness(self, asset: int) -> float:
+        """How much looser the tree of a deformed asset is than as it was built, by the surface of its boxes: queries cost about so much more. Above 1.5 or 2, an
+        asset built anew of the positions pays soon. 1 where the asset is not deformed."""
+        return self._core.looseness(whole_number(asset, "asset", 0, _MOST))
+
     def set_motion(self, body: int, motion: int) -> None:
         """Changes what moves a body: MOVING, FIXED, KINEMATIC or SLEEPING."""
         self._core.set_motion(whole_number(body, "body", 0, _MOST), whole_number(motion, "motion", 0, 3))

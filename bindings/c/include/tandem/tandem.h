@@ -95,6 +95,8 @@ enum {
   TANDEM_NO_ORIENTED_BLOCKS = 209, TANDEM_NO_AXIS_ALIGNED_BLOCKS = 210, TANDEM_NO_TOPOLOGY = 211, TANDEM_NO_FINEST_LEVEL = 212,
   TANDEM_BAD_REACH = 213, TANDEM_BAD_TOLERANCE = 214, TANDEM_BAD_DURATION = 215, TANDEM_NO_MASS = 216,
   TANDEM_BAD_JOINT = 217, TANDEM_NO_AXIS = 218, TANDEM_JOINS_NOTHING = 219,
+  TANDEM_NO_SOURCE_VERTICES = 220, TANDEM_VERTEX_COUNT_MISMATCH = 221, TANDEM_DEFORMED = 222,
+  TANDEM_NOT_FLOAT32 = 223,
   // A GPU (tandem_cuda.h).
   TANDEM_NO_GPU = 300, TANDEM_DRIVER_TOO_OLD = 301, TANDEM_GPU_NOT_SUPPORTED = 302,
   TANDEM_OUT_OF_GPU_MEMORY = 303, TANDEM_CUDA_FAILED = 304
@@ -247,6 +249,7 @@ typedef struct tandem_asset_info {
   uint64_t file_bytes;
   uint64_t hash;             ///< of the content, as bvhinfo prints it
   uint64_t source_faces;     ///< faces of the mesh file
+  uint64_t source_vertices;  ///< vertices of the mesh file; 0: the asset cannot be deformed
   double origin[3];          ///< the mesh file's coordinates = stored coordinates + origin
   double rounding_error;     ///< of a coordinate, at most
   float lower[3], upper[3];  ///< bounds in stored coordinates, of every level
@@ -386,6 +389,29 @@ TANDEM_API tandem_status tandem_scene_set_threads(tandem_scene* scene, uint32_t 
 /// after an error there are no assets either. where: the place of an asset that is null.
 TANDEM_API tandem_status tandem_scene_set_assets(tandem_scene* scene, tandem_asset* const* assets,
                                                  size_t count);
+
+/// Gives the vertices of an asset other positions, as often as the caller likes: all its bodies take the
+/// shape of the triangles between these. A body that bends alone gets an entry of its own in the list of
+/// assets, where an asset may stand several times. Questions are then about these positions, posed as usual,
+/// and decide as exactly as for rigid bodies: all but tandem_scene_find_verdicts() (TANDEM_DEFORMED), and,
+/// where some coordinate is no float32 number, but those about manifolds, containment and impacts
+/// (TANDEM_NOT_FLOAT32).
+///
+/// positions: x, y, z of each source vertex, in the file's coordinates; vertex_count: as in
+/// tandem_asset_info, in the order of the vertices that the asset was built from. They are copied. Takes time
+/// and, the first time, memory in proportion to the triangles. Result: TANDEM_UNKNOWN_ASSET;
+/// TANDEM_NO_SOURCE_VERTICES; TANDEM_VERTEX_COUNT_MISMATCH; TANDEM_OUT_OF_RANGE, where tandem_scene_where()
+/// is the first vertex with a coordinate that is NaN or beyond 3.4e38, or vertex_count where a body then
+/// reaches beyond 1e300; or TANDEM_OUT_OF_MEMORY. After an error nothing has changed.
+TANDEM_API tandem_status tandem_scene_deform(tandem_scene* scene, uint32_t asset, const float* positions,
+                                             size_t vertex_count);
+TANDEM_API tandem_status tandem_scene_deform_f64(tandem_scene* scene, uint32_t asset, const double* positions,
+                                                 size_t vertex_count);
+
+/// How much looser the tree of a deformed asset is than as it was built: its inner boxes' surface by that of
+/// its leaves' boxes, divided by the same of the file's tree. Queries cost about so much more. Above 1.5 or 2
+/// an asset built anew of the positions pays soon. 1 where the asset is not deformed, or there is none.
+TANDEM_API double tandem_scene_looseness(const tandem_scene* scene, uint32_t asset);
 
 /// Places all bodies anew; those that stand as before cost next to nothing. filter: or null. Result:
 /// TANDEM_OK, or, where tandem_scene_where() is the body: TANDEM_UNKNOWN_ASSET, TANDEM_POSE_NOT_RIGID,

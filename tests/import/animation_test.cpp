@@ -59,18 +59,18 @@ Points positions_at(const Animation& animation, double seconds, std::size_t clip
   return points;
 }
 
-/// An arm of two bones along y. The lower one stands at the origin, the upper one at (0, 1, 0), and turns about
-/// z by 90 degrees from second 1 to second 3. The mesh's node stands elsewhere, which must not matter.
+/// An arm of two bones along y. The lower one stands at the origin, the upper one at (0, 1, 0), and turns
+/// about z by 90 degrees from second 1 to second 3. The mesh's node stands elsewhere, which must not matter.
 /// The vertices: at the foot, at the joint, at the tip, and twice at one place of both bones.
 MotionFile arm() {
   MotionFile file;
-  const int positions = file.add_floats("VEC3", 3, {0, 0, 0, 0, 1, 0, 0, 2, 0, 0.5, 1.25, 0.5, 0.5, 1.25, 0.5});
-  const int indices =
-      file.add("SCALAR", 5123, bytes_of<std::uint16_t>({0, 1, 3, 1, 2, 4}), 6);
-  const int joints = file.add("VEC4", 5121,
-                              bytes_of<std::uint8_t>({0, 0, 0, 0, 0, 1, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 1, 0, 0, 0}), 5);
-  const int weights = file.add_floats("VEC4", 4, {1,    0,    0, 0, 0.5,  0.5,  0, 0, 1, 0,
-                                                  0,    0,    0.3f, 0.6f, 0, 0, 0.6f, 0.3f, 0, 0});
+  const int positions =
+      file.add_floats("VEC3", 3, {0, 0, 0, 0, 1, 0, 0, 2, 0, 0.5, 1.25, 0.5, 0.5, 1.25, 0.5});
+  const int indices = file.add("SCALAR", 5123, bytes_of<std::uint16_t>({0, 1, 3, 1, 2, 4}), 6);
+  const int joints = file.add(
+      "VEC4", 5121, bytes_of<std::uint8_t>({0, 0, 0, 0, 0, 1, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 1, 0, 0, 0}), 5);
+  const int weights = file.add_floats(
+      "VEC4", 4, {1, 0, 0, 0, 0.5, 0.5, 0, 0, 1, 0, 0, 0, 0.3f, 0.6f, 0, 0, 0.6f, 0.3f, 0, 0});
   const int inverse = file.add_floats("MAT4", 16, {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0,  0, 1,
                                                    1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, -1, 0, 1});
   const int times = file.add_floats("SCALAR", 1, {1, 3});
@@ -79,11 +79,12 @@ MotionFile arm() {
   const auto text = [](int number) { return std::to_string(number); };
   file.gltf.nodes = R"({"mesh": 0, "skin": 0, "translation": [5, 6, 7]}, {"children": [2]},
                        {"translation": [0, 1, 0]})";
-  file.gltf.meshes = R"({"primitives": [{"attributes": {"POSITION": )" + text(positions) + R"(, "JOINTS_0": )" +
-                     text(joints) + R"(, "WEIGHTS_0": )" + text(weights) + R"(}, "indices": )" + text(indices) +
-                     "}]}";
+  file.gltf.meshes = R"({"primitives": [{"attributes": {"POSITION": )" + text(positions) +
+                     R"(, "JOINTS_0": )" + text(joints) + R"(, "WEIGHTS_0": )" + text(weights) +
+                     R"(}, "indices": )" + text(indices) + "}]}";
   file.gltf.more = R"("scenes": [{"nodes": [0, 1]}], "skins": [{"joints": [1, 2], "inverseBindMatrices": )" +
-                   text(inverse) + R"(}], "animations": [{"name": "bend", "channels": [{"sampler": 0, "target":
+                   text(inverse) +
+                   R"(}], "animations": [{"name": "bend", "channels": [{"sampler": 0, "target":
                    {"node": 2, "path": "rotation"}}], "samplers": [{"input": )" +
                    text(times) + R"(, "output": )" + text(turns) + "}]}]";
   return file;
@@ -165,7 +166,8 @@ TEST(Animation, StepsAndCubicSplinesGoByTheirRules) {
   expect_near({positions_at(steps, 0.75)[2]}, {{1.5, 2, 0}});
   expect_near({positions_at(steps, 2)[2]}, {{2, 4, 8}});
   // In-tangent, value and out-tangent of both weights at each of three times.
-  const Animation cubic = *morphing("CUBICSPLINE", {0, 0, 0, 0, 1, 0, 2, 0, 1, 0, 3, 0, 0, 0, 0, 0, 0, 0}).read().animation;
+  const Animation cubic =
+      *morphing("CUBICSPLINE", {0, 0, 0, 0, 1, 0, 2, 0, 1, 0, 3, 0, 0, 0, 0, 0, 0, 0}).read().animation;
   // Halfway: 0.125 of the first out-tangent 1, half of the value 1, -0.125 of the in-tangent 2.
   expect_near({positions_at(cubic, 0.5)[2]}, {{1, 2, 8 * (0.125 + 0.5 - 0.25)}});
   // The second piece is two seconds long, and tangents count so many times.
@@ -197,8 +199,10 @@ std::string error_of(MotionFile file, const std::string& wrong, const std::strin
 
 TEST(Animation, WhatIsAmissIsNamed) {
   EXPECT_EQ(error_of(arm(), R"("joints": [1, 9])", R"("joints": [1, 2])"), "skins[0] names nodes[9] of 3");
-  EXPECT_EQ(error_of(arm(), R"("joints": [1])", R"("joints": [1, 2])"), "meshes[0], primitive 0: a vertex names joint 1 of 1");
-  EXPECT_EQ(error_of(arm(), R"("joints": [1, 2, 1])", R"("joints": [1, 2])"), "skins[0] has 2 matrices for 3 joints");
+  EXPECT_EQ(error_of(arm(), R"("joints": [1])", R"("joints": [1, 2])"),
+            "meshes[0], primitive 0: a vertex names joint 1 of 1");
+  EXPECT_EQ(error_of(arm(), R"("joints": [1, 2, 1])", R"("joints": [1, 2])"),
+            "skins[0] has 2 matrices for 3 joints");
   EXPECT_EQ(error_of(arm(), R"("sampler": 4)", R"("sampler": 0)"), "animations[0] names samplers[4] of 1");
   EXPECT_EQ(error_of(arm(), R"("node": 7)", R"("node": 2)"), "animations[0] names nodes[7] of 3");
   EXPECT_EQ(error_of(arm(), R"("scenes": [{"nodes": [0]}])", R"("scenes": [{"nodes": [0, 1]}])"),

@@ -19,9 +19,9 @@ double dot(const Quaternion& a, const Quaternion& b) {
   return (a[0] * b[0] + a[1] * b[1]) + (a[2] * b[2] + a[3] * b[3]);
 }
 
-// Turns from a to b at an even pace, the shorter way. The middle of an arc is the sum of its ends, made as long
-// as they are, so halving the arc needs no sine. After 20 halvings of at most 90 degrees the arc is shorter
-// than 2^-19, and a chord differs from it by less than the roundings do.
+// Turns from a to b at an even pace, the shorter way. The middle of an arc is the sum of its ends, made as
+// long as they are, so halving the arc needs no sine. After 20 halvings of at most 90 degrees the arc is
+// shorter than 2^-19, and a chord differs from it by less than the roundings do.
 Quaternion turned_between(Quaternion a, Quaternion b, double u) {
   constexpr int kHalvings = 20;
   a = normalised(a), b = normalised(b);
@@ -132,7 +132,8 @@ class ScenePose {
   void positions(std::vector<Point>& out) {
     for (const std::uint32_t node : data_.order) {
       const int parent = data_.nodes[node].parent;
-      world_[node] = parent < 0 ? local_[node] : combined(world_[static_cast<std::size_t>(parent)], local_[node]);
+      world_[node] =
+          parent < 0 ? local_[node] : combined(world_[static_cast<std::size_t>(parent)], local_[node]);
     }
     out.clear();
     out.reserve(data_.vertex_count);

@@ -56,15 +56,15 @@ std::vector<AnimationTime> spread_times(const std::vector<AnimationClip>& clips,
 
 /// A mesh and its motion, or the reason why there are none.
 struct AnimatedMesh {
-  ReadResult read;  ///< the mesh at rest; its points are the source vertices
+  ReadResult read;                     ///< the mesh at rest; its points are the source vertices
   std::optional<Animation> animation;  ///< where read.ok
 };
 
 /// Reads a glTF file's mesh and animations.
 ///
-/// Result: the mesh as import_mesh() reads it, but posed as the file says: skins and morph targets are applied
-/// at rest. Errors: those of read_gltf(); a file that is no glTF or has no animation; skins, morph targets and
-/// animations that contradict themselves or name what is not there. Never throws.
+/// Result: the mesh as import_mesh() reads it, but posed as the file says: skins and morph targets are
+/// applied at rest. Errors: those of read_gltf(); a file that is no glTF or has no animation; skins, morph
+/// targets and animations that contradict themselves or name what is not there. Never throws.
 AnimatedMesh import_animated(const std::filesystem::path& path, const ImportOptions& options);
 
 }  // namespace tandem::build

@@ -54,8 +54,8 @@ struct AnimationChannel {
   Interpolation interpolation = Interpolation::linear;
   std::size_t width = 3;       ///< numbers of a value
   std::vector<double> times;   ///< ascending
-  std::vector<double> values;  ///< for each time one; of cubic splines its in-tangent before and its out-tangent
-                               ///< after it
+  std::vector<double> values;  ///< for each time one; of cubic splines its in-tangent before and its
+                               ///< out-tangent after it
 };
 
 struct AnimationData {

@@ -5,8 +5,7 @@ namespace {
 
 GltfPrimitiveMotion primitive_motion(const GltfObject& from) {
   GltfPrimitiveMotion to;
-  from.each("targets",
-            [&to](const GltfObject& target) { to.targets.push_back(target.index("POSITION")); });
+  from.each("targets", [&to](const GltfObject& target) { to.targets.push_back(target.index("POSITION")); });
   from.with("attributes", [&to](const GltfObject& all) {
     for (int set = 0;; ++set) {
       const std::string joints = "JOINTS_" + std::to_string(set), weights = "WEIGHTS_" + std::to_string(set);
@@ -20,8 +19,7 @@ GltfPrimitiveMotion primitive_motion(const GltfObject& from) {
 
 GltfMeshMotion mesh_motion(const GltfObject& from) {
   GltfMeshMotion to{{}, from.list<double>("weights")};
-  from.each("primitives",
-            [&to](const GltfObject& item) { to.primitives.push_back(primitive_motion(item)); });
+  from.each("primitives", [&to](const GltfObject& item) { to.primitives.push_back(primitive_motion(item)); });
   return to;
 }
 

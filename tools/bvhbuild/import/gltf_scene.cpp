@@ -79,9 +79,8 @@ void each_primitive(const GltfMesh& mesh, std::size_t index,
 ParsedGltf parse_gltf(std::string_view bytes, const std::filesystem::path& folder, const ReadLimits& limits) {
   const GltfContainer file = open_gltf_container(bytes);
   ParsedGltf parsed{parse_gltf_json(file.json, limits.memory_bytes), {}};
-  parsed.model =
-      read_gltf_model(GltfObject(parsed.json),
-                      {folder, file.is_binary, file.chunk, limits.memory_bytes, limits.outside_files});
+  parsed.model = read_gltf_model(GltfObject(parsed.json), {folder, file.is_binary, file.chunk,
+                                                           limits.memory_bytes, limits.outside_files});
   parsed.model.bytes_held += bytes.size();
   return parsed;
 }

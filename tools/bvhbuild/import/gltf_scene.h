@@ -31,8 +31,9 @@ struct GltfPlace {
   std::shared_ptr<const std::string> path = std::make_shared<std::string>();
 };
 
-/// Calls `visit(index, place)` for all nodes of the scene, depth first, parents before their children. No node
-/// is visited twice, so the way ends. Throws a GltfError for nodes that are no tree, or that are not there.
+/// Calls `visit(index, place)` for all nodes of the scene, depth first, parents before their children. No
+/// node is visited twice, so the way ends. Throws a GltfError for nodes that are no tree, or that are not
+/// there.
 void walk_scene(const GltfModel& model,
                 const std::function<void(std::size_t node, const GltfPlace& place)>& visit);
 

@@ -120,8 +120,9 @@ class MotionReader {
     }
     if (motion_.nodes[node].skin != -1 && !motion.joints.empty()) {
       run.skin = motion_.nodes[node].skin;
-      add_influences(named(data_.skins, "skins", run.skin, numbered("nodes", static_cast<std::int64_t>(node))),
-                     motion, run);
+      add_influences(
+          named(data_.skins, "skins", run.skin, numbered("nodes", static_cast<std::int64_t>(node))), motion,
+          run);
     }
     data_.vertex_count += run.base.size();
     data_.runs.push_back(std::move(run));
@@ -183,7 +184,8 @@ class MotionReader {
     for (const GltfChannel& channel : from.channels) {
       if (channel.node == -1) continue;  // an extension says what it moves
       const std::string name = numbered("animations", static_cast<std::int64_t>(index));
-      const bool is_shown = in_scene_[&named(model_.nodes, "nodes", channel.node, name) - model_.nodes.data()];
+      const bool is_shown =
+          in_scene_[&named(model_.nodes, "nodes", channel.node, name) - model_.nodes.data()];
       const GltfSampler& sampler = named(from.samplers, "samplers", channel.sampler, name);
       if (!is_shown || !add_channel(channel, sampler, name, channels)) continue;
       clip.begin = std::min(clip.begin, channels.back().times.front());
@@ -214,11 +216,17 @@ class MotionReader {
     const auto node = static_cast<std::size_t>(from.node);
     if (path->second != AnimatedPath::weights && motion_.nodes[node].has_matrix)
       throw GltfError(name + " moves " + numbered("nodes", from.node) + ", which has a matrix");
-    AnimationChannel to{static_cast<std::uint32_t>(from.node), path->second, interpolation->second, 3, {}, {}};
+    AnimationChannel to{
+        static_cast<std::uint32_t>(from.node), path->second, interpolation->second, 3, {}, {}};
     to.times = numbers(sampler.input, 1, "a time");
-    to.values = numbers(sampler.output, to.path == AnimatedPath::weights ? 1 : to.path == AnimatedPath::rotation ? 4 : 3,
+    to.values = numbers(sampler.output,
+                        to.path == AnimatedPath::weights    ? 1
+                        : to.path == AnimatedPath::rotation ? 4
+                                                            : 3,
                         "a value of an animation");
-    to.width = to.path == AnimatedPath::weights ? target_count(node) : to.path == AnimatedPath::rotation ? 4 : 3;
+    to.width = to.path == AnimatedPath::weights    ? target_count(node)
+               : to.path == AnimatedPath::rotation ? 4
+                                                   : 3;
     if (to.width == 0) return false;
     check_keys(to, name);
     channels.push_back(std::move(to));

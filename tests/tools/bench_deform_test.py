@@ -11,6 +11,7 @@ import h5py
 import numpy as np
 
 import bvh_file
+from animation_test import Worm
 from bench_test import BenchTest, change, documented_keys, table_of
 from tool_test import BVHBUILD, CUBE_OBJ, SOURCE_DIR, UNREADABLE_INPUT, USAGE, grid_ply
 
@@ -166,6 +167,34 @@ class Deform(DeformBenchTest):
         self.write_frames(CUBE + 10)
         self.assertGreater(self.query()["contacts"], 0)
         self.assertEqual(json.loads(self.passes("distance", self.scene, "--json"))["touching"], 1)
+
+
+class Animations(DeformBenchTest):
+    def setUp(self):
+        super().setUp()
+        self.worm = self.write("worm.glb", Worm().file)
+
+    def test_an_animation_is_followed(self):
+        told = self.deform("--rebuild", "--frames", "5", scene=self.worm)
+        contacts = [frame["contacts"] for frame in told["peers"][0]["each_frame"]]
+        self.assertEqual((told["frames"], told["triangles"]), (5, len(Worm().faces)))
+        self.assertEqual([frame["contacts"] for frame in told["peers"][1]["each_frame"]], contacts)
+        self.assertGreater(min(contacts), 0)
+        self.assertGreater(len(set(contacts)), 1)
+        with_self = self.deform("--rebuild", "--self", "--leave-out-rings", "1", "--frames", "5", scene=self.worm)
+        self.assertGreater(with_self["peers"][0]["contacts"], told["peers"][0]["contacts"])
+
+    def test_the_tree_of_a_file_gives_the_same_contacts(self):
+        for options in ((), ("--animation",)):
+            self.succeeds(BVHBUILD, self.worm, "-o", self.out, *options)
+            built, of_file = (self.deform("--frames", "4", *arguments, scene=self.worm)["peers"][0] for arguments in ((), ("--asset", self.out)))
+            self.assertEqual(*([frame["contacts"] for frame in peer["each_frame"]] for peer in (built, of_file)))
+
+    def test_what_is_refused(self):
+        self.assert_fails(self.bench("deform", self.worm, "--asset", self.mesh), UNREADABLE_INPUT, "cube.bvh", "is of 8 vertices")
+        self.assert_fails(self.bench("deform", self.write("none.glb", b"glTF")), UNREADABLE_INPUT, "none.glb")
+        self.write_frames(CUBE)
+        self.assert_deform_fails(USAGE, "--asset is for animations", arguments=("--asset", self.mesh))
 
 
 class MadeDeformations(DeformBenchTest):

@@ -3,6 +3,7 @@
 #include <numeric>
 #include <sstream>
 
+#include "animated_scene.h"
 #include "bvhbench/engines/registry.h"
 #include "common/number_words.h"
 #include "common/output_file.h"
@@ -17,6 +18,7 @@ struct DeformArguments : CommonArguments {
   bool rebuild = false, self_pairs = false;
   std::uint32_t leave_out_rings = 0;
   std::vector<std::string> peers;
+  std::string asset;
 };
 
 /// The peers' frames, and what they are about.
@@ -155,39 +157,60 @@ void write_csv(const DeformArguments& arguments, const Measured& measured) {
   if (!reason.empty()) throw OutputError(arguments.output + ": " + reason);
 }
 
-ExitCode run_deform(const DeformArguments& arguments) {
-  if (arguments.self_pairs && !arguments.peers.empty())
-    throw UsageError("--self is for Tandem alone, so --peers does not go with it");
-  const LoadedScene scene = open_scene(arguments);
-  const Deformations deformations(arguments.scene, scene);
-  const ScenePairs pairs(scene.description);
-  const BendingScene bending = {
-      arguments.scene,
-      scene.views(),
-      scene.description.instances,
-      pairs.given(),
-      pairs.filter(),
-      {deformations.shapes().begin(), deformations.shapes().end()},
-      deformations.frames(),
-      [&](std::uint32_t shape, std::uint32_t frame) { return deformations.read(shape, frame); }};
-  const std::uint32_t frames = arguments.frames.value_or(bending.frames);
-  if (frames > bending.frames)
-    throw UsageError(arguments.scene + ": has " + std::to_string(bending.frames) + " frames, not " +
-                     std::to_string(frames));
-  const DeformOptions options = {frames,
+Measured measure(const DeformArguments& arguments, const BendingScene& scene, const LoadedScene& names) {
+  const DeformOptions options = {arguments.frames.value_or(scene.frames),
                                  arguments.threads(),
                                  arguments.repeats,
                                  arguments.rebuild,
                                  arguments.self_pairs,
                                  arguments.leave_out_rings,
                                  arguments.peers};
-  Measured measured = {frames, bending.bending_triangles(),
-                       answer_of(arguments.scene, scene, [&] { return measure_frames(bending, options); })};
-  for (std::uint32_t frame = 0; frame < frames; ++frame) {
+  if (options.frames > scene.frames) {
+    throw UsageError(arguments.scene + ": has " + std::to_string(scene.frames) + " frames, not " +
+                     std::to_string(options.frames));
+  }
+  Measured measured = {options.frames, scene.bending_triangles(),
+                       answer_of(arguments.scene, names, [&] { return measure_frames(scene, options); })};
+  for (std::uint32_t frame = 0; frame < options.frames; ++frame) {
     const auto has_frame = [&](const PeerFrames& peer) { return peer.frames[frame].has_value(); };
     if (std::all_of(measured.peers.begin(), measured.peers.end(), has_frame))
       measured.common.push_back(frame);
   }
+  return measured;
+}
+
+Measured measure_scene(const DeformArguments& arguments) {
+  if (!arguments.asset.empty()) throw UsageError("--asset is for animations of glTF files");
+  const LoadedScene scene = open_scene(arguments);
+  const Deformations deformations(arguments.scene, scene);
+  const ScenePairs pairs(scene.description);
+  BendingScene bending;
+  bending.path = arguments.scene;
+  bending.shapes = scene.views();
+  bending.instances = scene.description.instances;
+  bending.given_pairs = pairs.given();
+  bending.filter = pairs.filter();
+  bending.bending.assign(deformations.shapes().begin(), deformations.shapes().end());
+  bending.frames = deformations.frames();
+  bending.positions = [&](std::uint32_t shape, std::uint32_t frame) {
+    return deformations.read(shape, frame);
+  };
+  return measure(arguments, bending, scene);
+}
+
+Measured measure_animation(const DeformArguments& arguments) {
+  check_output(arguments, {arguments.scene, arguments.asset});
+  const AnimatedScene animated(arguments.scene, arguments.asset, arguments.frames.value_or(100),
+                               arguments.threads());
+  return measure(arguments, animated.scene(), animated.names());
+}
+
+ExitCode run_deform(const DeformArguments& arguments) {
+  if (arguments.self_pairs && !arguments.peers.empty())
+    throw UsageError("--self is for Tandem alone, so --peers does not go with it");
+  const std::string ending = std::filesystem::path(arguments.scene).extension().string();
+  const bool is_gltf = ending == ".glb" || ending == ".gltf";
+  const Measured measured = is_gltf ? measure_animation(arguments) : measure_scene(arguments);
   if (!arguments.output.empty()) write_csv(arguments, measured);
   print(arguments, report_of(arguments, measured));
   return kDone;
@@ -211,8 +234,11 @@ void add_deform(Command tool, Run& run_later) {
       "refit the trees of bodies that bend, frame by frame, and find their contacts", run_deform);
   arguments.told_threads = 1;
   command.add(
-      {scene_argument(arguments, "scene file (HDF5) with deformations"),
-       {"--frames", arguments.frames, "N [all]", "how many frames, from the first on", between(1, 4e9)},
+      {scene_argument(arguments, "scene file (HDF5) with deformations, or animation (.glb, .gltf)"),
+       {"--asset", arguments.asset, "",
+        "for an animation: the .bvh file of its mesh; else one is built for it", file_name()},
+       {"--frames", arguments.frames, "N",
+        "the first N frames of a scene, else all; or so many of an animation, else 100", between(1, 4e9)},
        {"--rebuild", arguments.rebuild,
         "also trees that are built anew for every frame, whose contacts must be the same"},
        separated_by_commas({"--peers", arguments.peers, joined(peers_of_tandem()),

@@ -85,6 +85,7 @@ class Gpu final : public SceneDevice {
     on_gpu.sorted = on_gpu.grouped = true;
     on_gpu.within = options.within;
     on_gpu.add_error_bounds = options.add_error_bounds;
+    on_gpu.leave_out_rings = options.leave_out_rings;
     const auto find_contacts = [&](auto& query) {
       Status status = query.find_contacts(instances_, pairs_, on_gpu, kStream);
       if (status == Status::kOk) status = copy(query.contacts(), query.report().contacts, found.rows);

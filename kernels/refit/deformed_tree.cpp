@@ -12,18 +12,25 @@ namespace {
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
 /// The next float32 number that is not above x, and not below it. Condition: |x| <= kMaxCoordinate.
-float rounded_down(float x) { return x; }
-float rounded_up(float x) { return x; }
+float rounded_down(float x) {
+  return x;
+}
+float rounded_up(float x) {
+  return x;
+}
 float rounded_down(double x) {
   const float near = static_cast<float>(x);
   return static_cast<double>(near) > x ? std::nextafter(near, -kInfinity) : near;
 }
-float rounded_up(double x) { return -rounded_down(-x); }
+float rounded_up(double x) {
+  return -rounded_down(-x);
+}
 
 double surface(const Block& block) {
   double sum = 0;
   for (int i = 0; i < kNodesPerBlock && block.kind[i] != NodeKind::imaginary; ++i) {
-    const double x = static_cast<double>(block.half_extent[0][i]), y = static_cast<double>(block.half_extent[1][i]),
+    const double x = static_cast<double>(block.half_extent[0][i]),
+                 y = static_cast<double>(block.half_extent[1][i]),
                  z = static_cast<double>(block.half_extent[2][i]);
     sum += x * y + y * z + z * x;
   }
@@ -67,6 +74,11 @@ RefitSurfaces refit_scalar(const RefitTree& tree, const float* positions) {
 
 double ratio(const RefitSurfaces& surfaces) {
   return surfaces.of_leaves > 0 ? surfaces.of_inner / surfaces.of_leaves : 0;
+}
+
+Refit best_refit() {
+  static const Refit way = best_way(refit_way);
+  return way;
 }
 
 /// The bounds of all positions, for which as many vertices are looked at at a time as fill whole vectors.
@@ -126,15 +138,17 @@ Status DeformedTree::begin(const LevelView& rest) {
   level_.error_bound = 0;
   level_.number = 0;
   RefitSurfaces at_rest;
-  for (const Block& block : blocks_.view())
-    (block.is_leaf_block() ? at_rest.of_leaves : at_rest.of_inner) += surface(block);
+  for (std::size_t b = blocks_.size(); b-- > 0;)  // in the order of refit()
+    (blocks_[b].is_leaf_block() ? at_rest.of_leaves : at_rest.of_inner) += surface(blocks_[b]);
   surface_at_rest_ = ratio(at_rest);
   return Status::kOk;
 }
 
-void DeformedTree::refit_by(const float* positions) {
-  static const Refit way = best_way(refit_way);
-  surface_ = ratio(way({blocks_.data(), triangles_.data(), sources_.data(), level_.block_count}, positions));
+RefitSurfaces DeformedTree::refit_by(Refit way, const float* positions) {
+  const RefitSurfaces surfaces =
+      way({blocks_.data(), triangles_.data(), sources_.data(), level_.block_count}, positions);
+  surface_ = ratio(surfaces);
+  return surfaces;
 }
 
 double DeformedTree::looseness() const {
@@ -144,7 +158,7 @@ double DeformedTree::looseness() const {
 Status DeformedTree::refit(std::span<const float> positions) {
   for (double& off : rounding_) off = 0;
   level_.precise = nullptr;
-  refit_by(positions.data());
+  refit_by(best_refit(), positions.data());
   return Status::kOk;
 }
 
@@ -175,7 +189,7 @@ Status DeformedTree::refit(std::span<const double> positions) {
     for (int i = 0; i < kNodesPerBlock && block.kind[i] == NodeKind::leaf; ++i)
       refit_leaf(block, i, positions.data());
   }
-  refit_by(nullptr);
+  refit_by(best_refit(), nullptr);
   return Status::kOk;
 }
 

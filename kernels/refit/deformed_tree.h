@@ -17,39 +17,42 @@ class DeformedTree : public Allocated {
   Status begin(const LevelView& rest);
 
   /// Moves the corners to the positions of their source vertices, three numbers each, and refits all boxes
-  /// around them: each contains what is below it in real arithmetic. Takes time in proportion to the triangles.
-  /// Condition: begin() has succeeded, there is a position for each source vertex, and check_positions() found
-  /// nothing. Result: kOk; or kOutOfMemory, and nothing has changed.
+  /// around them: each contains what is below it in real arithmetic. Takes time in proportion to the
+  /// triangles. Condition: begin() has succeeded, there is a position for each source vertex, and
+  /// check_positions() found nothing. Result: kOk; or kOutOfMemory, and nothing has changed.
   Status refit(std::span<const float> positions);
   Status refit(std::span<const double> positions);
+
+  /// Refits by a way of the caller's. positions: as of refit(), or null, where the leaves' boxes stay.
+  RefitSurfaces refit_by(Refit way, const float* positions);
 
   /// The level, at the positions of the last refit(). Its pointers stay until begin() is called again.
   const LevelView& level() const { return level_; }
 
-  /// How far a vertex may be from the corner that the triangles hold, along each axis: 0 where all positions are
-  /// float32 numbers.
+  /// How far a vertex may be from the corner that the triangles hold, along each axis: 0 where all positions
+  /// are float32 numbers.
   const double (&rounding() const)[3] { return rounding_; }
 
-  /// The surface of all inner boxes divided by that of all leaves' boxes, by the same of the tree that begin() was
-  /// given; 1 where either has no surface.
+  /// The surface of all inner boxes divided by that of all leaves' boxes, by the same of the tree that
+  /// begin() was given; 1 where either has no surface.
   double looseness() const;
 
  private:
   void refit_leaf(Block& block, int node, const double* positions);
-  void refit_by(const float* positions);
 
   Buffer<Block> blocks_;
   Buffer<Triangle> triangles_;
   Buffer<PreciseCorners> precise_;  // only where vertices are float64 numbers
   Buffer<CornerSources> sources_;   // of each triangle: the source vertices of its corners
   LevelView level_;
-  Buffer<float> single_;            // positions in float64 that are float32 numbers
+  Buffer<float> single_;  // positions in float64 that are float32 numbers
   double rounding_[3] = {};
   double surface_ = 0, surface_at_rest_ = 0;
 };
 
-/// Returns the first of these positions, three numbers each, that is not finite or whose magnitude along an axis is
-/// beyond kMaxCoordinate; or, where there is none, how many there are. lower, upper: then the bounds of all.
+/// Returns the first of these positions, three numbers each, that is not finite or whose magnitude along an
+/// axis is beyond kMaxCoordinate; or, where there is none, how many there are. lower, upper: then the bounds
+/// of all.
 std::size_t check_positions(std::span<const float> positions, float (&lower)[3], float (&upper)[3]);
 std::size_t check_positions(std::span<const double> positions, float (&lower)[3], float (&upper)[3]);
 

@@ -91,8 +91,8 @@ TANDEM_INLINE Lanes4 joined(const Lanes4 (&of)[3], const Join& join) {
 }
 
 /// The box of a node is that of the child's nodes. An imaginary one has the interval [inf, -inf], and the
-/// half-extent -infinity is less than all others, whatever is added to it; NaN in what says how a sum is rounded
-/// changes nothing.
+/// half-extent -infinity is less than all others, whatever is added to it; NaN in what says how a sum is
+/// rounded changes nothing.
 TANDEM_INLINE void refit_node(const Block& child, Block& block, int node) {
   const auto least = [](const Lanes4& a, const Lanes4& b) { return lesser(a, b); };
   const auto most = [](const Lanes4& a, const Lanes4& b) { return larger(a, b); };

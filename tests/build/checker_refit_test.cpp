@@ -58,8 +58,7 @@ TEST(CheckRefit, AcceptsTheSampleAndShowsBothSections) {
   for (std::uint32_t t = 0; t < level.triangle_count; ++t) {
     // Triangle t of the file is source face f of the mesh, whose corners are points 3 f to 3 f + 2.
     for (std::uint32_t k = 0; k < 3; ++k)
-      EXPECT_EQ(level.source_vertices[level.topology[t].vertex[k]],
-                3 * level.triangles[t].source_face() + k);
+      EXPECT_EQ(level.source_vertices[level.topology[t].vertex[k]], 3 * level.triangles[t].source_face() + k);
   }
   const CheckResult without = sample().check();
   EXPECT_EQ(without.asset.header->source_vertices, 0u);

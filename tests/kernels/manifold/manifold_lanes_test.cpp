@@ -46,7 +46,8 @@ std::size_t compare_variants(ManifoldScene& scene) {
   scene.find();
   std::vector<manifold::Shape> shapes;
   for (const AssetView& view : scene.assets.views())
-    shapes.push_back(manifold::shape_of(view.level(), view.header->lower, view.header->upper, view.header->origin));
+    shapes.push_back(
+        manifold::shape_of(view.level(), view.header->lower, view.header->upper, view.header->origin));
   const std::span<const Contact> contacts = scene.query.rows();
   std::size_t patches = 0;
   for (std::size_t first = 0, end = 0; first < contacts.size(); first = end) {

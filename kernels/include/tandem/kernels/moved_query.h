@@ -29,8 +29,8 @@ struct MovedCounters {
 /// Finds the object pairs that have moved, so that the next question need only be about these. Rows are the
 /// pairs that are to be asked about, in the order of pairs(): those that have moved by more than the
 /// tolerance since they last were rows, that were not among the pairs of the call before, or one of whose
-/// bodies is of another asset. The others are kept: what was found of them is that of the poses where they
-/// were rows. ManifoldQuery keeps their manifolds.
+/// bodies is of another asset, or of one that has been deformed since. The others are kept: what was found of
+/// them is that of the poses where they were rows. ManifoldQuery keeps their manifolds.
 ///
 /// The motion is bounded from above (kernels/geometry/pair_motion.h), rounding included, so a pair may be a
 /// row although it has moved by a little less. Result of find(): kOk; kBadTolerance, where where() of the

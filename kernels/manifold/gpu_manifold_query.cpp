@@ -184,8 +184,9 @@ Status GpuManifoldQuery::enqueue(const GpuInstances& instances, const GpuMoved& 
   args.moved = moved;
   args.match_previous = true;
   const auto take_shapes = [&](const auto&, cudaStream_t on) { return host_->take_shapes(on); };
-  return host_->keep(gpu::queue(args, stream, take_shapes, gpu::remember_kept, gpu::remember_points, gpu::make_patches,
-                                gpu::count_kept_manifolds, gpu::place_manifolds, gpu::move_kept_manifolds));
+  return host_->keep(gpu::queue(args, stream, take_shapes, gpu::remember_kept, gpu::remember_points,
+                                gpu::make_patches, gpu::count_kept_manifolds, gpu::place_manifolds,
+                                gpu::move_kept_manifolds));
 }
 
 Status GpuManifoldQuery::make(const GpuInstances& instances, const GpuMoved& moved,

@@ -15,7 +15,8 @@ __device__ void take_shape(const GpuAsset& asset, manifold::Shape& shape) {
 }
 
 template <typename Taken>
-__global__ void __launch_bounds__(kThreads) take_shapes(const GpuAsset* records, std::uint32_t count, Taken* taken) {
+__global__ void __launch_bounds__(kThreads)
+    take_shapes(const GpuAsset* records, std::uint32_t count, Taken* taken) {
   const std::uint32_t i = blockIdx.x * kThreads + threadIdx.x;
   if (i < count) take_shape(records[i], taken[i]);
 }

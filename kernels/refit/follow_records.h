@@ -7,7 +7,8 @@
 #include "kernels/manifold/body.h"
 #include "tandem/kernels/gpu_arrays.h"
 
-// Questions that keep something of each asset in a form of their own take it anew from the records that they follow.
+// Questions that keep something of each asset in a form of their own take it anew from the records that they
+// follow.
 namespace tandem::gpu {
 
 cudaError_t follow_records(const GpuAsset* records, std::uint32_t count, manifold::Shape* shapes,

@@ -9,8 +9,8 @@
 namespace tandem::gpu {
 namespace {
 
-// A thread block checks so many vertices at least; a body has no more checks than that, since each of its clusters
-// looks at all.
+// A thread block checks so many vertices at least; a body has no more checks than that, since each of its
+// clusters looks at all.
 constexpr std::uint64_t kVerticesAtLeast = 1024, kMostChecks = 64;
 
 std::uint32_t checks_of(std::uint64_t vertices) {
@@ -152,7 +152,8 @@ struct HostOf<GpuDeformReport> : GpuHost<DeformState, GpuDeformReport> {
 
   // Copies some elements of a tree, if it has any, to the next place; result: that place, or null.
   template <typename Element>
-  Element* copied(const Element* from, std::size_t count, Element*& next, Status& status, cudaStream_t stream) {
+  Element* copied(const Element* from, std::size_t count, Element*& next, Status& status,
+                  cudaStream_t stream) {
     if (from == nullptr || status != Status::kOk) return nullptr;
     Element* const to = next;
     next += count;
@@ -246,8 +247,9 @@ struct HostOf<GpuDeformReport> : GpuHost<DeformState, GpuDeformReport> {
     }
     for (std::size_t i = 0, end = 0; i < deforming.size(); i = end) {
       for (end = i + 1; end < deforming.size() && deforming[end] == deforming[end - 1] + 1;) ++end;
-      const Status status = keep(cudaMemcpyAsync(records.assets + deforming[i], run.data() + i,
-                                                 (end - i) * sizeof(GpuAsset), cudaMemcpyHostToDevice, stream));
+      const Status status =
+          keep(cudaMemcpyAsync(records.assets + deforming[i], run.data() + i, (end - i) * sizeof(GpuAsset),
+                               cudaMemcpyHostToDevice, stream));
       if (status != Status::kOk) return status;
     }
     return keep(cudaStreamSynchronize(stream));

@@ -1,9 +1,9 @@
 #include "kernels/common/pair_record.h"
 #include "kernels/refit/refit_data.h"
 
-// These kernels refit trees. They are compiled without fused operations: boxes have the bytes of DeformedTree. A thread
-// block refits a cluster of blocks in shared memory. 16 lanes refit a block: lane 4 k + i has axis k of node i, and the
-// last four lanes repeat axis 2.
+// These kernels refit trees. They are compiled without fused operations: boxes have the bytes of
+// DeformedTree. A thread block refits a cluster of blocks in shared memory. 16 lanes refit a block: lane 4 k
+// + i has axis k of node i, and the last four lanes repeat axis 2.
 namespace tandem::gpu {
 namespace {
 
@@ -32,8 +32,8 @@ __device__ Interval enclose(float lower, float upper) {
 
 /// The lanes that refit one block.
 struct BlockLanes {
-  std::uint32_t lane = threadIdx.x % kLanesPerBlock, node = lane % kNodesPerBlock, column = lane / kNodesPerBlock,
-                axis = column < 3 ? column : 2;
+  std::uint32_t lane = threadIdx.x % kLanesPerBlock, node = lane % kNodesPerBlock,
+                column = lane / kNodesPerBlock, axis = column < 3 ? column : 2;
   std::uint32_t all = 0xFFFFu << (threadIdx.x % 32 / kLanesPerBlock * kLanesPerBlock);
 
   /// Joins what the lanes of the four nodes have.
@@ -50,8 +50,7 @@ struct BlockLanes {
   __device__ float size_of(float half_extent) const {
     const double x = from(half_extent, 0), y = from(half_extent, 1), z = from(half_extent, 2);
     const double surface = (x * y + y * z) + z * x;
-    const double largest =
-        joined(x >= 0 ? surface : 0, [](double a, double b) { return a < b ? b : a; });
+    const double largest = joined(x >= 0 ? surface : 0, [](double a, double b) { return a < b ? b : a; });
     return static_cast<float>(sqrt(largest / 3));
   }
 
@@ -67,7 +66,8 @@ struct BlockLanes {
 /// Shared memory of a thread block that refits a cluster.
 template <bool kFromTriangles>
 struct ClusterMemory {
-  static constexpr std::uint32_t kBoxes = kFromTriangles ? kMostClusterBlocks : kMostInputs + kMostClusterBlocks;
+  static constexpr std::uint32_t kBoxes =
+      kFromTriangles ? kMostClusterBlocks : kMostInputs + kMostClusterBlocks;
   float corner[kFromTriangles ? kMostInputs : 1][3][3];  ///< of the triangles
   float centre[kBoxes][3], half_extent[kBoxes][3];       ///< of boxes around inputs, and then around blocks
 };
@@ -109,8 +109,8 @@ __device__ Interval around_triangle(const float (&corner)[3][3], std::uint32_t a
 }
 
 /// Stores a lane's share of a refitted block.
-__device__ void store(const DeformingBody& body, const RefitBlock& block, const BlockLanes& lanes, const Interval& own,
-                      const Interval& around, float size) {
+__device__ void store(const DeformingBody& body, const RefitBlock& block, const BlockLanes& lanes,
+                      const Interval& own, const Interval& around, float size) {
   if (lanes.column < 3) {
     if (body.blocks != nullptr) {
       body.blocks[block.block].centre[lanes.axis][lanes.node] = own.centre;
@@ -132,8 +132,8 @@ __device__ void store(const DeformingBody& body, const RefitBlock& block, const 
 }
 
 template <bool kFromTriangles>
-__device__ void refit_block(const DeformingBody& body, const RefitBlock& block, bool is_leaf_block, std::uint32_t box,
-                            ClusterMemory<kFromTriangles>& memory) {
+__device__ void refit_block(const DeformingBody& body, const RefitBlock& block, bool is_leaf_block,
+                            std::uint32_t box, ClusterMemory<kFromTriangles>& memory) {
   const BlockLanes lanes;
   const std::uint32_t below = block.below[lanes.node];
   const bool is_real = below != RefitBlock::kNothing;
@@ -238,7 +238,8 @@ __global__ void __launch_bounds__(kThreads) check_positions(const __grid_constan
   const DeformingBody& body = args.bodies[work.body];
   const float* const positions = args.positions[work.body];
   if (positions == nullptr) return;
-  const std::uint64_t each = (body.vertices + body.check_count - 1) / body.check_count, begin = each * work.item,
+  const std::uint64_t each = (body.vertices + body.check_count - 1) / body.check_count,
+                      begin = each * work.item,
                       end = begin + each < body.vertices ? begin + each : body.vertices;
   PositionCheck own = check_vertices(positions, begin, end);
   for (int k = 0; k < 3; ++k) {
@@ -269,7 +270,8 @@ __device__ Block root_of(const DeformingBody& body) {
 }
 
 /// The asset has the shape of its refitted tree.
-__device__ void write_record(const DeformingBody& body, const PositionCheck& all, const GpuAssetRecords& records) {
+__device__ void write_record(const DeformingBody& body, const PositionCheck& all,
+                             const GpuAssetRecords& records) {
   GpuAsset& asset = records.assets[body.asset];
   AssetBounds& bounds = records.bounds[body.asset];
   asset.extent = extent_of(root_of(body));
@@ -320,8 +322,8 @@ cudaError_t refit_bodies(const DeformArgs& args, cudaStream_t stream) {
   cudaError_t error = launch_after(grid(args.work_end[0], kThreads), check_positions, args);
   for (std::uint32_t round = 0; round < args.rounds && error == cudaSuccess; ++round) {
     const std::uint32_t begin = args.work_end[round], count = args.work_end[round + 1] - begin;
-    error = launch_after(grid(count, kThreads), round == 0 ? refit_clusters<true> : refit_clusters<false>, args,
-                         args.work + begin);
+    error = launch_after(grid(count, kThreads), round == 0 ? refit_clusters<true> : refit_clusters<false>,
+                         args, args.work + begin);
   }
   return error == cudaSuccess ? launch_after(grid(1, kFinishThreads), finish, args) : error;
 }

@@ -10,11 +10,11 @@ struct PlanNode {
   std::uint32_t below[kNodesPerBlock];  ///< triangles or blocks
   int count;                            ///< of real nodes
   bool is_leaf_block;
-  bool done;                            ///< a round has it
-  std::uint32_t size;                   ///< blocks of the subtree
-  std::uint32_t left;                   ///< of them, those that are not done
-  std::uint32_t height;                 ///< above what its cluster begins with
-  std::uint32_t slot;                   ///< in its cluster
+  bool done;             ///< a round has it
+  std::uint32_t size;    ///< blocks of the subtree
+  std::uint32_t left;    ///< of them, those that are not done
+  std::uint32_t height;  ///< above what its cluster begins with
+  std::uint32_t slot;    ///< in its cluster
   std::uint32_t root = kNoIndex;
   std::uint32_t oriented = kNoIndex, first_below = 0;
   BlockRotation rotation = kNoRotation;
@@ -145,7 +145,8 @@ class PlanMaker {
     RefitCluster cluster = {};
     cluster.first_block = static_cast<std::uint32_t>(plans_.blocks.size());
     cluster.blocks = count;
-    cluster.first_input = static_cast<std::uint32_t>(plan_.rounds == 0 ? first_triangle() : plans_.inputs.size());
+    cluster.first_input =
+        static_cast<std::uint32_t>(plan_.rounds == 0 ? first_triangle() : plans_.inputs.size());
     cluster.first_height = static_cast<std::uint32_t>(plans_.height_ends.size());
     cluster.heights = heights;
     std::uint32_t slot = 0;

@@ -23,7 +23,12 @@ struct GpuAsset {
 /// The asset that lies in GPU memory with level `level` of a file, which lies in CPU memory. on_gpu: as
 /// DeviceAssets::level() gives it. Condition: level < file.levels.size().
 inline GpuAsset gpu_asset(const LevelView& on_gpu, const AssetView& file, std::uint32_t level = 0) {
-  GpuAsset asset = {on_gpu, extent_of(file.level(level).blocks[0]), {}, {}, {}, file.header->source_faces,
+  GpuAsset asset = {on_gpu,
+                    extent_of(file.level(level).blocks[0]),
+                    {},
+                    {},
+                    {},
+                    file.header->source_faces,
                     file.header->source_vertices};
   std::copy_n(file.header->origin, 3, asset.origin);
   std::copy_n(file.header->lower, 3, asset.lower);

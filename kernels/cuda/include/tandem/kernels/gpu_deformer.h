@@ -44,17 +44,20 @@ class GpuAssetList {
 
 /// The outcome of a call.
 struct GpuDeformReport {
-  Status status;       ///< kOk, or kOutOfRange
-  std::uint32_t body;  ///< the first with a coordinate that is NaN or beyond kMaxCoordinate, and the first vertex
+  Status status;  ///< kOk, or kOutOfRange
+  std::uint32_t
+      body;  ///< the first with a coordinate that is NaN or beyond kMaxCoordinate, and the first vertex
   std::uint64_t where;
 };
 
-/// Deforms bodies on the GPU: it owns a copy of the tree of each, and gives that the positions of the body's source
-/// vertices, which lie in GPU memory. Records of assets name these copies, so queries that follow() the records, and a
-/// broad phase that is given their bounds, are about the deformed bodies. Boxes are those of Scene::deform(), and
-/// oriented blocks have the same along the axes of the mesh. The same positions give the same bytes.
+/// Deforms bodies on the GPU: it owns a copy of the tree of each, and gives that the positions of the body's
+/// source vertices, which lie in GPU memory. Records of assets name these copies, so queries that follow()
+/// the records, and a broad phase that is given their bounds, are about the deformed bodies. Boxes are those
+/// of Scene::deform(), and oriented blocks have the same along the axes of the mesh. The same positions give
+/// the same bytes.
 ///
-/// Throws nothing. Movable, not copyable. Several deformers may write to the records of one list, each its own.
+/// Throws nothing. Movable, not copyable. Several deformers may write to the records of one list, each its
+/// own.
 class GpuDeformer {
  public:
   GpuDeformer();
@@ -62,26 +65,27 @@ class GpuDeformer {
   GpuDeformer& operator=(GpuDeformer&&) noexcept;
   ~GpuDeformer();  ///< waits for the device
 
-  /// Names the bodies that deform: each is an asset of the list, whose tree is copied on the current device behind
-  /// what `stream` holds. The record of the asset names the copy from then on, in the shape that it has in the file.
-  /// Returns when that is done. Holds, for each body, the bytes of its triangles, blocks and oriented blocks. Takes
-  /// the trees back to the CPU once for each that is another.
+  /// Names the bodies that deform: each is an asset of the list, whose tree is copied on the current device
+  /// behind what `stream` holds. The record of the asset names the copy from then on, in the shape that it
+  /// has in the file. Returns when that is done. Holds, for each body, the bytes of its triangles, blocks and
+  /// oriented blocks. Takes the trees back to the CPU once for each that is another.
   ///
-  /// bodies: ascending numbers in the list. records: of the list, in GPU memory; they outlive the deformer. What the
-  /// assets' trees point to, but for what is copied, outlives the queries. Result: kOk; kUnknownAsset;
-  /// kNoSourceVertices, where the file has none or they were not uploaded; kOutOfRange (2^32 - 1 blocks or thread
-  /// blocks in all); kOutOfMemory, kOutOfGpuMemory, or another that status_of() of gpu_status.h names. After an error
-  /// no body deforms.
+  /// bodies: ascending numbers in the list. records: of the list, in GPU memory; they outlive the deformer.
+  /// What the assets' trees point to, but for what is copied, outlives the queries. Result: kOk;
+  /// kUnknownAsset; kNoSourceVertices, where the file has none or they were not uploaded; kOutOfRange (2^32 -
+  /// 1 blocks or thread blocks in all); kOutOfMemory, kOutOfGpuMemory, or another that status_of() of
+  /// gpu_status.h names. After an error no body deforms.
   Status begin(std::span<const GpuAsset> assets, std::span<const std::uint32_t> bodies,
                const GpuAssetRecords& records, cudaStream_t stream);
 
-  /// Queues a call behind what `stream` holds, which may be captured into a graph: it neither waits for the GPU nor
-  /// allocates. All bodies take their new shapes by as many kernels as one body of the most triangles does: four of
-  /// up to some 100,000.
+  /// Queues a call behind what `stream` holds, which may be captured into a graph: it neither waits for the
+  /// GPU nor allocates. All bodies take their new shapes by as many kernels as one body of the most triangles
+  /// does: four of up to some 100,000.
   ///
-  /// positions: in GPU memory, as what they point to: of each body the x, y, z of each source vertex in float32, in
-  /// the file's coordinates, as many as FileHeader::source_vertices; null: the body stays as it is. A body whose
-  /// positions are bad stays as it is, too, and the first is reported. Result: kOk or what CUDA said.
+  /// positions: in GPU memory, as what they point to: of each body the x, y, z of each source vertex in
+  /// float32, in the file's coordinates, as many as FileHeader::source_vertices; null: the body stays as it
+  /// is. A body whose positions are bad stays as it is, too, and the first is reported. Result: kOk or what
+  /// CUDA said.
   Status enqueue(const float* const* positions, cudaStream_t stream);
 
   /// Deforms the bodies, and waits for the end. Result: that of the report, or of a call that failed.

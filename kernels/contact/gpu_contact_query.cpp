@@ -85,6 +85,11 @@ struct HostOf<GpuContactReport> : GpuHost<QueryState, GpuContactReport> {
     return known == Status::kOk ? assets.set(given, all, *this, stream) : known;
   }
 
+  Status follow(const GpuAsset* of_list) {
+    assets.records = of_list;
+    return Status::kOk;
+  }
+
   Status reserve(const GpuContactCapacity& wanted, const GpuContactOptions& options) {
     if (wanted.undecided > kMostUndecided) return Status::kOutOfGpuMemory;
     Status status = keep(of_pairs.grow(wanted.pairs));

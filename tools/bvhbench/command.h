@@ -22,6 +22,7 @@ void add_impact(Command tool, Run& run_later);
 void add_distance(Command tool, Run& run_later);
 void add_compare(Command tool, Run& run_later);
 void add_simulate(Command tool, Run& run_later);
+void add_deform(Command tool, Run& run_later);
 void add_economy(Command tool, Run& run_later);
 void add_frame(Command tool, Run& run_later);
 void add_poses(Command tool, Run& run_later);

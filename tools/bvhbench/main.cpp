@@ -57,6 +57,7 @@ int main(int argc, char** argv) {
   add_distance(tool, run);
   add_compare(tool, run);
   add_simulate(tool, run);
+  add_deform(tool, run);
   add_economy(tool, run);
   add_frame(tool, run);
   add_poses(tool, run);

@@ -4,6 +4,7 @@
 #include "bvhbench/engines/registry.h"
 #include "bvhbench/scenes/contacts_file.h"
 #include "contained.h"
+#include "deform.h"
 #include "query_tolerance.h"
 #include "tandem/kernels/bodies_at_query.h"
 
@@ -18,6 +19,7 @@ struct QueryArguments : CommonArguments {
   std::optional<double> tolerance;
   std::optional<std::array<double, 3>> at;
   std::optional<double> kept_within;
+  std::optional<std::uint32_t> frame;
   bool first_contact = false, self_pairs = false;
   bool grouped = false, sorted = false, traversal = false, manifolds = false, contained = false;
 
@@ -74,6 +76,19 @@ ContactTable table_of(const LoadedScene& scene, TimedAnswer& timed) {
   return make_table(timed.pairs, std::move(faces));
 }
 
+// Deforms the shapes as the frame says.
+void bend(Engine& engine, const QueryArguments& arguments, const LoadedScene& scene) {
+  const Deformations deformations(arguments.scene, scene);
+  if (*arguments.frame >= deformations.frames()) {
+    throw UsageError(arguments.scene + ": has " + std::to_string(deformations.frames()) +
+                     " frames, so there is no frame " + std::to_string(*arguments.frame));
+  }
+  for (const std::uint32_t shape : deformations.shapes()) {
+    const Positions positions = deformations.read(shape, *arguments.frame);
+    deform(engine, shape, positions, arguments.scene, *arguments.frame);
+  }
+}
+
 // Runs the query as often as asked; the answer is the last run's, which is every run's.
 Answer find(const QueryArguments& arguments, const LoadedScene& scene) {
   const std::vector<AssetView> views = scene.views();
@@ -90,6 +105,7 @@ Answer find(const QueryArguments& arguments, const LoadedScene& scene) {
   engine->set_shapes(views);
   engine->set_filter(pairs.filter());
   engine->update(scene.description.instances);
+  if (arguments.frame) bend(*engine, arguments, scene);
   answer.timed = engine->time_query({pairs.given(), arguments.repeats, arguments.order(), arguments.traversal,
                                      arguments.manifolds, arguments.kept_within});
   answer.counters = engine->counters();
@@ -135,6 +151,7 @@ Report report_of(const QueryArguments& arguments, const LoadedScene& scene, cons
               {"self_pairs", arguments.self_pairs},
               {"within", arguments.within},
               {"leave_out_rings", arguments.leave_out_rings}});
+  if (arguments.frame) report.add("frame", *arguments.frame);
   add_setting(report, arguments, scene);
   report["triangles"].row("triangles");
   add_contacts(report, arguments, scene, answer);
@@ -188,6 +205,8 @@ void check_options(const QueryArguments& arguments) {
   }
   if (arguments.within > 0 && arguments.takes_all_contacts())
     throw UsageError("--manifolds and --contained take contacts, so --within does not go with them");
+  if (arguments.frame && (arguments.contained || arguments.at || arguments.on_gpu()))
+    throw UsageError("--frame is for contacts and manifolds on the CPU");
   const bool tandem = arguments.gpu_engine == "tandem-cuda";
   if (!arguments.on_gpu()) {
     const std::pair<bool, const char*> told[] = {{!tandem, "--engine"},
@@ -212,8 +231,8 @@ void check_options(const QueryArguments& arguments) {
 // The command prints and writes rows about pairs of bodies here, so options of contacts do not go with it.
 ExitCode run_by_tolerance(const QueryArguments& arguments) {
   if (arguments.mode != QueryMode::exact || arguments.first_contact || arguments.within > 0 ||
-      arguments.self_pairs || arguments.leave_out_rings > 0 || arguments.takes_all_contacts() ||
-      arguments.is_for_gpu()) {
+      arguments.self_pairs || arguments.frame || arguments.leave_out_rings > 0 ||
+      arguments.takes_all_contacts() || arguments.is_for_gpu()) {
     throw UsageError("--tolerance finds no contacts, so options that are about them do not go with it");
   }
   return run_tolerance(arguments, *arguments.tolerance);
@@ -269,6 +288,7 @@ void add_query(Command tool, Run& run_later) {
        {"--leave-out-rings", arguments.leave_out_rings, "N [0]",
         "of an instance with itself: leave out triangles that share a vertex (1), or that N - 1 edges join",
         between(0, kMostRings)},
+       {"--frame", arguments.frame, "N", "of the scene's deformations; without it nothing bends", between(0, 4e9)},
        threads_option(arguments, "the contacts do"),
        repeat_option(arguments),
        output_option(arguments, "the contacts file to write; appears whole or not at all"),

@@ -1,6 +1,8 @@
 #include <BulletCollision/CollisionShapes/btTriangleIndexVertexArray.h>
 #include <BulletCollision/Gimpact/btGImpactShape.h>
 
+#include <algorithm>
+
 #include "library_engine.h"
 
 namespace tandem {
@@ -24,6 +26,13 @@ class BulletMesh {
   ~BulletMesh() { part_->unlockChildShapes(); }
 
   const btGImpactMeshShapePart& part() const { return *part_; }
+
+  void move_vertices(std::span<const double> vertices) {
+    std::transform(vertices.begin(), vertices.end(), mesh_.vertices.begin(),
+                   [](double x) { return static_cast<float>(x); });
+    shape_.postUpdate();
+    shape_.updateBound();
+  }
 
  private:
   IndexedMesh mesh_;
@@ -68,6 +77,10 @@ class BulletEngine final : public EngineWith<BulletMesh> {
   void place(std::span<const Pose> poses) override {
     transforms_.clear();
     for (const Pose& pose : poses) transforms_.push_back(transform(pose));
+  }
+
+  void move_vertices(std::uint32_t shape, std::span<const double> vertices) override {
+    kept(shape).move_vertices(vertices);
   }
 
   void collide(std::uint32_t pair, std::uint32_t a, std::uint32_t b) override {

@@ -154,10 +154,24 @@ class EmbreeEngine final : public EngineWith<IndexedMesh> {
   }
 
   void place(std::span<const Pose> poses) override {
+    for (std::size_t i = 0; i < poses.size(); ++i) place(bodies_[i], poses[i]);
+    throw_on_error();
+  }
+
+  static void place(EmbreeBody& body, const Pose& pose) {
+    body.place(pose);
+    rtcCommitGeometry(body.geometry);
+    rtcCommitScene(body.scene);
+  }
+
+  void move_vertices(std::uint32_t shape, std::span<const double> vertices) override {
+    std::transform(vertices.begin(), vertices.end(), kept(shape).vertices.begin(),
+                   [](double x) { return static_cast<float>(x); });
+  }
+
+  void follow(std::uint32_t shape, std::span<const Pose> poses) override {
     for (std::size_t i = 0; i < poses.size(); ++i) {
-      bodies_[i].place(poses[i]);
-      rtcCommitGeometry(bodies_[i].geometry);
-      rtcCommitScene(bodies_[i].scene);
+      if (shape_of()[i] == shape) place(bodies_[i], poses[i]);
     }
     throw_on_error();
   }

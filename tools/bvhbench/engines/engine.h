@@ -37,6 +37,9 @@ struct TriangleContact {
   friend auto operator<=>(const TriangleContact&, const TriangleContact&) = default;
 };
 
+/// Positions of the source vertices of a shape, x y z of each, as Scene::deform() takes them.
+using VertexPositions = std::variant<std::span<const float>, std::span<const double>>;
+
 /// The contacts that a step of a simulation asks for. Every exact engine gives the same list, whatever its
 /// threads.
 struct ContactList {
@@ -185,6 +188,14 @@ class Engine {
   /// Takes the places of the bodies. Their number and shapes may change from call to call; engines that keep
   /// something for each body then start anew. `bodies` must stay until the next call.
   virtual void update(std::span<const BodyPose> bodies) = 0;
+
+  /// Gives the source vertices of a shape other positions, in the file's coordinates. Its bodies take the
+  /// shape of the triangles between these, where they stand. Result: how loose the tree has become, as
+  /// Scene::looseness() says; nothing where the library does not tell. Condition: update(). Throws
+  /// EngineError as Scene::deform() fails.
+  virtual std::optional<double> deform(std::uint32_t /*shape*/, const VertexPositions& /*positions*/) {
+    cannot("deform shapes");
+  }
 
   /// Says how the bodies of the next update() move in a step of `duration` seconds, for impacts. `motion`
   /// must stay as long as they. Conditions: there is one for each of them; duration > 0; for engines that are

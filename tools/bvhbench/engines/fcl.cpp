@@ -48,6 +48,15 @@ class FclContacts final : public BodiesAtRest<Fcl, fcl::OBBd> {
   }
 
  private:
+  // replaceVertex(), since updateVertex() has boxes contain where vertices were, too.
+  void move_vertices(std::uint32_t shape, std::span<const double> vertices) override {
+    auto& model = kept(shape).model;
+    model.beginReplaceModel();
+    for (std::size_t i = 0; i < vertices.size(); i += 3)
+      model.replaceVertex({vertices[i], vertices[i + 1], vertices[i + 2]});
+    model.endReplaceModel(/*refit=*/true, /*bottomup=*/true);
+  }
+
   void collide(std::uint32_t pair, std::uint32_t a, std::uint32_t b) override {
     result_.clear();
     fcl::collide(model(a), transform(a), model(b), transform(b), request_, result_);

@@ -7,11 +7,13 @@
 namespace tandem {
 
 IndexedMesh::IndexedMesh(const LevelView& level) {
-  std::map<std::array<float, 3>, int> index_of;
-  for (const Triangle& triangle : std::span(level.triangles, level.triangle_count)) {
-    for (const Triangle::Corner& corner : triangle.corner) {
-      const std::array<float, 3> position = {corner.position[0], corner.position[1], corner.position[2]};
-      const auto [found, is_new] = index_of.try_emplace(position, static_cast<int>(vertex_count()));
+  std::map<std::pair<std::array<float, 3>, std::uint32_t>, int> index_of;
+  for (std::uint32_t t = 0; t < level.triangle_count; ++t) {
+    for (int c = 0; c < 3; ++c) {
+      const float* const corner = level.triangles[t].corner[c].position;
+      const std::array<float, 3> position = {corner[0], corner[1], corner[2]};
+      const std::uint32_t apart = level.source_vertices != nullptr ? level.topology[t].vertex[c] : 0;
+      const auto [found, is_new] = index_of.try_emplace({position, apart}, static_cast<int>(vertex_count()));
       if (is_new) vertices.insert(vertices.end(), position.begin(), position.end());
       corners.push_back(found->second);
     }
@@ -20,6 +22,7 @@ IndexedMesh::IndexedMesh(const LevelView& level) {
 
 void LibraryEngine::set_shapes(std::span<const AssetView> shapes) {
   shapes_.assign(shapes.begin(), shapes.end());
+  moving_.clear();
   shape_of_.clear();
   scene_.reset();
   clear_shapes();
@@ -38,7 +41,41 @@ void LibraryEngine::update(std::span<const BodyPose> bodies) {
   make_bodies(poses);
 }
 
+// The first time, says which source vertex each vertex is.
+LibraryEngine::MovingVertices& LibraryEngine::moving_vertices(std::uint32_t shape) {
+  moving_.resize(shapes_.size());
+  MovingVertices& moving = moving_[shape];
+  if (!moving.source.empty()) return moving;
+  const LevelView level = shapes_[shape].level();
+  if (level.source_vertices == nullptr) require(Status::kNoSourceVertices, shape);
+  const IndexedMesh mesh(level);
+  moving.source.resize(mesh.vertex_count());
+  moving.position.resize(mesh.vertices.size());
+  for (std::size_t i = 0; i < mesh.corners.size(); ++i) {
+    const std::uint32_t vertex = level.topology[i / 3].vertex[i % 3];
+    moving.source[static_cast<std::size_t>(mesh.corners[i])] = level.source_vertices[vertex];
+  }
+  return moving;
+}
+
+std::optional<double> LibraryEngine::deform(std::uint32_t shape, const VertexPositions& positions) {
+  MovingVertices& moving = moving_vertices(shape);
+  std::visit(
+      [&](const auto& given) {
+        if (given.size() != 3 * shapes_[shape].header->source_vertices)
+          require(Status::kVertexCountMismatch, given.size() / 3);
+        double* position = moving.position.data();
+        for (const std::uint32_t source : moving.source)
+          position = std::copy_n(&given[3 * std::size_t{source}], 3, position);
+      },
+      positions);
+  move_vertices(shape, moving.position);
+  follow(shape, stored_poses(bodies_));
+  return {};
+}
+
 std::span<const ObjectPair> LibraryEngine::find_pairs() {
+  if (!moving_.empty()) cannot("find pairs of bodies that bend");
   Status status = Status::kOk;
   if (scene_ == nullptr) {
     scene_ = std::make_unique<Scene>();
@@ -73,8 +110,14 @@ void LibraryEngine::find_impacts(std::span<const ObjectPair> pairs, std::vector<
 
 Pose LibraryEngine::end_of_step(std::uint32_t body) const {
   const BodyPose& at_start = bodies_[body];
-  return for_stored_coordinates(pose_at(at_start.pose, motion_[body], duration_),
-                                shapes_[at_start.asset].header->origin);
+  return for_stored_coordinates(pose_at(at_start.pose, motion_[body], duration_), origin_of(at_start.asset));
+}
+
+// Vertices that have moved are in the file's coordinates.
+const double (&LibraryEngine::origin_of(std::uint32_t shape) const)[3] {
+  static constexpr double kOfTheFile[3] = {0, 0, 0};
+  if (!moving_.empty() && !moving_[shape].source.empty()) return kOfTheFile;
+  return shapes_[shape].header->origin;
 }
 
 // Makes the poses of stored coordinates from those of the files' coordinates.
@@ -83,7 +126,7 @@ std::vector<Pose> LibraryEngine::stored_poses(std::span<const BodyPose> bodies) 
   poses.reserve(bodies.size());
   for (const BodyPose& body : bodies) {
     if (body.asset >= shapes_.size()) require(Status::kUnknownAsset, poses.size());
-    poses.push_back(for_stored_coordinates(body.pose, shapes_[body.asset].header->origin));
+    poses.push_back(for_stored_coordinates(body.pose, origin_of(body.asset)));
   }
   return poses;
 }

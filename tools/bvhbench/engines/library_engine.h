@@ -5,8 +5,8 @@
 
 namespace tandem {
 
-/// An asset's level 0 as other libraries take it: corners that coincide share a vertex; triangles in leaf
-/// order.
+/// An asset's level 0 as other libraries take it: corners that coincide share a vertex, unless they
+/// are of different source vertices; triangles in leaf order.
 struct IndexedMesh {
   explicit IndexedMesh(const LevelView& level);
 
@@ -30,6 +30,7 @@ class LibraryEngine : public Engine {
 
   void set_shapes(std::span<const AssetView> shapes) final;
   void update(std::span<const BodyPose> bodies) final;
+  std::optional<double> deform(std::uint32_t shape, const VertexPositions& positions) final;
   std::span<const ObjectPair> find_pairs() final;
   void query(std::span<const ObjectPair> pairs) override;
   bool contacts(std::vector<TriangleContact>& found) override;
@@ -49,6 +50,14 @@ class LibraryEngine : public Engine {
 
   /// Moves the bodies. `poses` speak of stored coordinates.
   virtual void place(std::span<const Pose> poses) = 0;
+
+  /// Moves the vertices of a shape, x y z of each, which are those of its IndexedMesh, and refits its tree.
+  virtual void move_vertices(std::uint32_t /*shape*/, std::span<const double> /*vertices*/) {
+    cannot("deform shapes");
+  }
+
+  /// Lets the bodies of a shape whose vertices have moved follow. `poses`, of all bodies, are as for place().
+  virtual void follow(std::uint32_t /*shape*/, std::span<const Pose> poses) { place(poses); }
 
   /// Adds the contacts of bodies a and b to contacts_, and what was looked at to candidates_.
   virtual void collide(std::uint32_t /*pair*/, std::uint32_t /*a*/, std::uint32_t /*b*/) {
@@ -76,10 +85,19 @@ class LibraryEngine : public Engine {
   std::uint64_t candidates_ = 0;
 
  private:
+  /// A shape whose vertices move: their source vertices, and where they are.
+  struct MovingVertices {
+    std::vector<std::uint32_t> source;
+    std::vector<double> position;  ///< x y z, in the file's coordinates
+  };
+
+  MovingVertices& moving_vertices(std::uint32_t shape);
+  const double (&origin_of(std::uint32_t shape) const)[3];
   std::vector<Pose> stored_poses(std::span<const BodyPose> bodies) const;
 
   std::span<const BodyPose> bodies_;
   std::vector<AssetView> shapes_;
+  std::vector<MovingVertices> moving_;  ///< of each shape, empty until it is deformed; none where none is
   std::vector<std::uint32_t> shape_of_;
   std::unique_ptr<Scene> scene_;  ///< made when pairs are asked for
 };
@@ -92,6 +110,7 @@ class EngineWith : public LibraryEngine {
 
  protected:
   const Shape& shape(std::uint32_t body) const { return *kept_[shape_of()[body]]; }
+  Shape& kept(std::uint32_t shape) { return *kept_[shape]; }
   void clear_shapes() override { kept_.clear(); }
 
  private:

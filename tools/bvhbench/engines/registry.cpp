@@ -26,6 +26,7 @@ struct Entry {
   std::string_view needs;
   Maker* make;  // null where what it needs was not found
   bool has_modes = false;
+  bool deforms = false;
 
   bool answers(const Question& question) const { return (questions >> question.index() & 1u) != 0; }
 };
@@ -42,11 +43,11 @@ constexpr Maker *kTandemCuda = where(TANDEM_HAVE_CUDA, make_tandem_cuda),
                 *kBullet = where(TANDEM_HAVE_BULLET, make_bullet), *kOde = where(TANDEM_HAVE_ODE, make_ode);
 
 constexpr Entry kEntries[] = {
-    {"tandem", "tandem", kAll, kSimulates, "", make_tandem, true},
+    {"tandem", "tandem", kAll, kSimulates, "", make_tandem, true, true},
     {"tandem-cuda", "", kAll, kSimulates, "CUDA", kTandemCuda, true},
     {"paper", "", kContacts, kSimulates, "CUDA", kPaper, true},
     {"paper-bits", "", kContacts, kSimulates, "CUDA", kPaper, true},
-    {"fcl", "fcl", kContacts, kSimulates, "FCL", kFcl},
+    {"fcl", "fcl", kContacts, kSimulates, "FCL", kFcl, false, true},
     {"fcl-rss", "fcl", kDistances, kCompares, "FCL", kFcl},
     {"fcl-obbrss", "fcl", kDistances, kCompares, "FCL", kFcl},
     {"fcl-oriented", "fcl", kImpacts, kCompares, "FCL", kFcl},
@@ -55,9 +56,9 @@ constexpr Entry kEntries[] = {
     {"fcl-public", "fcl", kImpacts, kCompares, "FCL", kFcl},
     {"coal-rss", "coal", kDistances, kCompares, "Coal", kCoal},
     {"coal-obbrss", "coal", kDistances, kCompares, "Coal", kCoal},
-    {"embree", "embree", kContacts, kSimulates, "Embree 3", kEmbree},
-    {"embree-refit", "embree", kContacts, kSimulates, "Embree 3", kEmbree},
-    {"bullet", "bullet", kContacts, kCompares, "Bullet", kBullet},
+    {"embree", "embree", kContacts, kSimulates, "Embree 3", kEmbree, false, true},
+    {"embree-refit", "embree", kContacts, kSimulates, "Embree 3", kEmbree, false, true},
+    {"bullet", "bullet", kContacts, kCompares, "Bullet", kBullet, false, true},
     {"ode", "ode", kContacts, kCompares, "ODE", kOde},
     {"cgal", "cgal", kContacts | kDistances, kCompares, "", make_cgal},
 };
@@ -84,6 +85,14 @@ std::vector<std::string_view> engine_names() {
   std::vector<std::string_view> names;
   for (const Entry& entry : kEntries) {
     if (entry.use == kSimulates) names.push_back(entry.name);
+  }
+  return names;
+}
+
+std::vector<std::string_view> deforming_engine_names() {
+  std::vector<std::string_view> names;
+  for (const Entry& entry : kEntries) {
+    if (entry.deforms && entry.make != nullptr) names.push_back(entry.name);
   }
   return names;
 }

@@ -12,6 +12,9 @@ namespace tandem {
 /// embree, embree-refit.
 std::vector<std::string_view> engine_names();
 
+/// The engines whose shapes can be deformed, of those built in; "tandem" is the first.
+std::vector<std::string_view> deforming_engine_names();
+
 /// Returns whether this program has the engine.
 bool is_built_in(std::string_view name);
 

@@ -27,6 +27,11 @@ class TandemEngine : public Engine {
     placed_ = false;
   }
 
+  std::optional<double> deform(std::uint32_t shape, const VertexPositions& positions) override {
+    check(std::visit([&](const auto& given) { return scene_.deform(shape, given); }, positions));
+    return scene_.looseness(shape);
+  }
+
  protected:
   void check(Status status) const { require(status, scene_.where()); }
 

@@ -245,8 +245,8 @@ std::vector<std::uint64_t> Hdf5Input::read_u64(const std::string& name, const Sh
   return values;
 }
 
-std::vector<double> Hdf5Input::read_f64(const std::string& name, const Shape& row) const {
-  const Dataset dataset = open(name, row);
+Hdf5Input::Dataset Hdf5Input::open_numbers(const std::string& name, const Shape& row) const {
+  Dataset dataset = open(name, row);
   const H5T_class_t type = dataset.type_class();
   if (type != H5T_FLOAT && type != H5T_INTEGER) {
     refuse(name, std::string("expected floating-point numbers, found ") + words_for(type));
@@ -254,9 +254,51 @@ std::vector<double> Hdf5Input::read_f64(const std::string& name, const Shape& ro
   if (type == H5T_FLOAT && H5Tget_size(dataset.type) > sizeof(double)) {
     refuse(name, "floating-point numbers of more than 64 bits");
   }
+  return dataset;
+}
+
+std::vector<double> Hdf5Input::read_f64(const std::string& name, const Shape& row) const {
+  const Dataset dataset = open_numbers(name, row);
   std::vector<double> values(dataset.count());
   read(dataset, H5T_NATIVE_DOUBLE, values.data());
   return values;
+}
+
+std::uint64_t Hdf5Input::count_rows(const std::string& name, const Shape& row) const {
+  return open_numbers(name, row).shape[0];
+}
+
+std::vector<double> Hdf5Input::read_f64_row(const std::string& name, const Shape& row,
+                                            std::uint64_t index) const {
+  const Dataset dataset = open_numbers(name, row);
+  std::vector<double> values(product(row));
+  if (values.empty()) return values;
+  Shape first(row.size() + 1, 0), one = row;
+  first[0] = index;
+  one.insert(one.begin(), 1);
+  const std::vector<hsize_t> start(first.begin(), first.end()), count(one.begin(), one.end());
+  const Handle in_file(H5Dget_space(dataset.id), H5Sclose),
+      transfer = lossless_transfer(),
+      in_memory(H5Screate_simple(static_cast<int>(count.size()), count.data(), nullptr), H5Sclose);
+  if (H5Sselect_hyperslab(in_file, H5S_SELECT_SET, start.data(), nullptr, count.data(), nullptr) < 0 ||
+      H5Dread(dataset.id, H5T_NATIVE_DOUBLE, in_memory, in_file, transfer, values.data()) < 0)
+    refuse(name, last_reason());
+  return values;
+}
+
+std::vector<std::string> Hdf5Input::names_in(const std::string& group) const {
+  std::vector<std::string> names;
+  if (!has(group)) return names;
+  const Handle links = access_within(H5P_LINK_ACCESS);
+  const Handle object(H5Oopen(file_, group.c_str(), links), H5Oclose);
+  if (object < 0) refuse(group, last_reason());
+  if (H5Iget_type(object) != H5I_GROUP) refuse(group, "not a group");
+  const auto add = [](hid_t, const char* name, const H5L_info_t*, void* to) -> herr_t {
+    static_cast<std::vector<std::string>*>(to)->emplace_back(name);
+    return 0;
+  };
+  if (H5Literate(object, H5_INDEX_NAME, H5_ITER_INC, nullptr, add, &names) < 0) refuse(group, last_reason());
+  return names;
 }
 
 std::vector<std::string> Hdf5Input::read_strings(const std::string& name) const {

@@ -45,6 +45,15 @@ class Hdf5Input {
   /// Reads a dataset of numbers that float64 holds without loss.
   std::vector<double> read_f64(const std::string& name, const Shape& row = {}) const;
 
+  /// The number of rows of a dataset that read_f64() would read.
+  std::uint64_t count_rows(const std::string& name, const Shape& row) const;
+
+  /// Reads one row of such a dataset. Condition: index < count_rows().
+  std::vector<double> read_f64_row(const std::string& name, const Shape& row, std::uint64_t index) const;
+
+  /// The names of what a group holds, sorted; none where there is no such group.
+  std::vector<std::string> names_in(const std::string& group) const;
+
   /// A dataset of n strings, of fixed or variable length.
   std::vector<std::string> read_strings(const std::string& name) const;
 
@@ -54,6 +63,7 @@ class Hdf5Input {
  private:
   struct Dataset;
   Dataset open_integers(const std::string& name, const Shape& row) const;
+  Dataset open_numbers(const std::string& name, const Shape& row) const;
   Dataset open(const std::string& name, const Shape& row) const;
   void check_extent(const Dataset& dataset) const;
   void read(const Dataset& dataset, std::int64_t memory_type, void* values) const;

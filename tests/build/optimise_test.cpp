@@ -43,7 +43,7 @@ Mesh nested(std::uint32_t n) {
   return mesh;
 }
 
-double cost_of(const WorkingTree& tree) {
+double cost_of(const WorkingTree<Bounds>& tree) {
   double cost = 0;
   for (std::uint32_t block = 1; block < tree.size(); ++block) cost += tree[block].box.visit_cost();
   return cost;
@@ -102,13 +102,13 @@ TEST(Optimise, BlocksLieDepthFirstWhateverTheEffort) {
 TEST(Optimise, MoreEffortNeverCostsMore) {
   for (const Mesh& mesh : {sheet(12), random_mesh(300, 5), nested(200)}) {
     const std::vector<Bounds> bounds = normalized_bounds(mesh.geometry());
-    for (const auto build : {build_minimal_tree, build_free_tree}) {
+    for (const auto build : {build_minimal_tree<Bounds>, build_free_tree<Bounds>}) {
       Topology topology = build(bounds);
-      double before = cost_of(WorkingTree(topology, bounds));
+      double before = cost_of(WorkingTree<Bounds>(topology, bounds));
       for (const Effort effort : {Effort::standard, Effort::best}) {
         OptimisationWatch watch;
         optimise(topology, bounds, effort, watch);
-        const double after = cost_of(WorkingTree(topology, bounds));
+        const double after = cost_of(WorkingTree<Bounds>(topology, bounds));
         EXPECT_LE(after, before);
         before = after;
       }
@@ -120,13 +120,13 @@ TEST(Optimise, FindsSomethingOnASheet) {
   const Mesh mesh = sheet(20);
   const std::vector<Bounds> bounds = normalized_bounds(mesh.geometry());
   Topology topology = build_minimal_tree(bounds);
-  const double greedy = cost_of(WorkingTree(topology, bounds));
+  const double greedy = cost_of(WorkingTree<Bounds>(topology, bounds));
   OptimisationWatch watch;
   optimise(topology, bounds, Effort::standard, watch);
-  const double exchanged = cost_of(WorkingTree(topology, bounds));
+  const double exchanged = cost_of(WorkingTree<Bounds>(topology, bounds));
   EXPECT_LT(exchanged, greedy);
   optimise(topology, bounds, Effort::best, watch);
-  EXPECT_LT(cost_of(WorkingTree(topology, bounds)), 0.99 * exchanged);
+  EXPECT_LT(cost_of(WorkingTree<Bounds>(topology, bounds)), 0.99 * exchanged);
 }
 
 TEST(Optimise, NeverDeepensATreeBeyondWhatAFileMayHold) {
@@ -168,7 +168,7 @@ TEST(Optimise, KeepsTheBestTreeWhenStopped) {
   watch.progress = [&](double share) { watch.stop = share > 0.05; };
   optimise(stopped, bounds, Effort::best, watch);
   EXPECT_TRUE(watch.stop);
-  EXPECT_LE(cost_of(WorkingTree(stopped, bounds)), cost_of(WorkingTree(exchanged, bounds)));
+  EXPECT_LE(cost_of(WorkingTree<Bounds>(stopped, bounds)), cost_of(WorkingTree<Bounds>(exchanged, bounds)));
 }
 
 TEST(Optimise, ProgressGoesFromNothingToTheShareOfTheTree) {
@@ -195,11 +195,11 @@ TEST(Optimise, ProgressGoesFromNothingToTheShareOfTheTree) {
 // and parents stay right.
 TEST(ExchangeSearch, PredictsTheChangeOfTheWholeCost) {
   std::mt19937 random(7);
-  for (const auto build : {build_minimal_tree, build_free_tree}) {
+  for (const auto build : {build_minimal_tree<Bounds>, build_free_tree<Bounds>}) {
     const Mesh mesh = random_mesh(150, 11);
     const std::vector<Bounds> bounds = normalized_bounds(mesh.geometry());
-    WorkingTree tree(build(bounds), bounds);
-    ExchangeSearch search(tree);
+    WorkingTree<Bounds> tree(build(bounds), bounds);
+    ExchangeSearch<Bounds> search(tree);
     const Region whole = cut_into_regions(tree, ~0u).front();
     int made = 0;
     for (int i = 0; i < 4000; ++i) {
@@ -215,7 +215,7 @@ TEST(ExchangeSearch, PredictsTheChangeOfTheWholeCost) {
       if (std::isinf(change)) continue;
       const double before = cost_of(tree);
       tree.apply(exchange, whole.root);
-      const WorkingTree anew(tree.topology(), bounds);
+      const WorkingTree<Bounds> anew(tree.topology(), bounds);
       ASSERT_NEAR(cost_of(anew) - before, change, 1e-5);
       for (std::uint32_t b = 0; b < tree.size(); ++b) {
         ASSERT_EQ(tree[b].height, anew[b].height);

@@ -1,6 +1,7 @@
 #include "gltf_accessor.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <limits>
 #include <string_view>
@@ -11,13 +12,6 @@
 
 namespace tandem::build {
 namespace {
-
-/// The item that `user` names.
-template <class Item>
-const Item& named(const std::vector<Item>& items, const char* list, int index, const std::string& user) {
-  if (index >= 0 && static_cast<std::size_t>(index) < items.size()) return items[index];
-  throw GltfError(user + " names " + numbered(list, index) + " of " + std::to_string(items.size()));
-}
 
 void check_end(const std::string& what, std::uint64_t end, const std::string& whole, std::uint64_t bytes) {
   if (end > bytes)
@@ -174,6 +168,10 @@ double coordinate(const char* bytes, bool normalized) {
   return value;
 }
 
+bool is_number_type(int type) {
+  return component_bytes(type) != 0;
+}
+
 bool is_position_type(int type) {
   return type != kUint32 && component_bytes(type) != 0;
 }
@@ -197,6 +195,26 @@ void read_positions(const GltfModel& model, int accessor, std::vector<Point>& po
                    coordinate<T>(bytes + 2 * sizeof(T), normalized)};
     });
   });
+}
+
+std::vector<double> read_numbers(const GltfModel& model, int accessor, int components, const char* purpose) {
+  check(model, accessor, components, is_number_type, purpose);
+  const auto width = static_cast<std::size_t>(components);
+  const bool normalized = model.accessors[accessor].normalized;
+  std::vector<double> numbers;
+  with_component(model.accessors[accessor].component_type, [&](auto zero) {
+    using T = decltype(zero);
+    std::vector<std::array<double, 16>> elements;
+    read_elements(model, accessor, elements, [&](const char* bytes) {
+      std::array<double, 16> element{};
+      for (std::size_t k = 0; k < width; ++k) element[k] = coordinate<T>(bytes + k * sizeof(T), normalized);
+      return element;
+    });
+    numbers.reserve(elements.size() * width);
+    for (const auto& element : elements)
+      numbers.insert(numbers.end(), element.begin(), element.begin() + components);
+  });
+  return numbers;
 }
 
 void read_indices(const GltfModel& model, int accessor, std::vector<std::uint32_t>& indices) {

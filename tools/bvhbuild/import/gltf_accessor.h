@@ -34,4 +34,9 @@ void read_positions(const GltfModel& model, int accessor, std::vector<Point>& po
 /// kNoVertex. Throws a GltfError for sparse indices out of range.
 void read_indices(const GltfModel& model, int accessor, std::vector<std::uint32_t>& indices);
 
+/// Returns the numbers of an accessor, element after element: floats, or integers, whole or normalised.
+/// Throws a GltfError for one that is not there, has another number of components or lies outside its
+/// buffers. purpose: for messages, such as "a weight".
+std::vector<double> read_numbers(const GltfModel& model, int accessor, int components, const char* purpose);
+
 }  // namespace tandem::build

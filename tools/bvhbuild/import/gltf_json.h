@@ -17,6 +17,14 @@ struct GltfError : std::runtime_error {
 /// Names an item of a list for messages: "accessors[3]".
 std::string numbered(const char* list, std::int64_t index);
 
+/// Returns the item that `user` names by its index; throws a GltfError where there is none.
+template <typename Item>
+const Item& named(const std::vector<Item>& items, const char* list, int index, const std::string& user) {
+  if (index >= 0 && static_cast<std::size_t>(index) < items.size())
+    return items[static_cast<std::size_t>(index)];
+  throw GltfError(user + " names " + numbered(list, index) + " of " + std::to_string(items.size()));
+}
+
 /// An object in the JSON of a glTF file. It knows its way there, so that errors name it.
 ///
 /// A member that is null counts as left out. A number that is left out reads as `otherwise` or 0, a text or a

@@ -139,9 +139,10 @@ GltfView view(const GltfObject& from) {
 }
 
 int components(const std::string& type) {
-  for (const auto& [name, count] : {std::pair{"SCALAR", 1}, {"VEC2", 2}, {"VEC3", 3}, {"VEC4", 4}})
+  for (const auto& [name, count] :
+       {std::pair{"SCALAR", 1}, {"VEC2", 2}, {"VEC3", 3}, {"VEC4", 4}, {"MAT4", 16}})
     if (type == name) return count;
-  return 0;  // matrices included: no position and no index is one
+  return 0;  // smaller matrices included: nothing that is read is one
 }
 
 GltfAccessor accessor(const GltfObject& from) {
@@ -210,32 +211,19 @@ std::vector<double> numbers(const GltfObject& node, const char* name, std::size_
   return result;
 }
 
-/// Scale, then rotation by a quaternion x y z w, then translation. A quaternion stored in decimal is never
-/// quite of length 1; dividing by its length leaves a rotation.
-Affine from_parts(const GltfObject& node) {
-  const std::vector<double> q = numbers(node, "rotation", 4), s = numbers(node, "scale", 3),
-                            t = numbers(node, "translation", 3);
-  Affine result = kIdentity;
-  if (!q.empty()) {
-    const double x = q[0], y = q[1], z = q[2], w = q[3];
-    if (x == 0 && y == 0 && z == 0 && w == 0)
-      throw GltfError(node.path("rotation") + " is zero, which is no rotation");
-    const double f = 2 / (x * x + y * y + z * z + w * w);
-    result = {{{1 - f * (y * y + z * z), f * (x * y - z * w), f * (x * z + y * w), 0},
-               {f * (x * y + z * w), 1 - f * (x * x + z * z), f * (y * z - x * w), 0},
-               {f * (x * z - y * w), f * (y * z + x * w), 1 - f * (x * x + y * y), 0}}};
-  }
-  for (int row = 0; row < 3; ++row) {
-    for (int column = 0; column < 3 && !s.empty(); ++column) result[row][column] *= s[column];
-    if (!t.empty()) result[row][3] = t[row];
-  }
+template <std::size_t n>
+std::optional<std::array<double, n>> part(const GltfObject& node, const char* name) {
+  const std::vector<double> list = numbers(node, name, n);
+  if (list.empty()) return std::nullopt;
+  std::array<double, n> result;
+  std::copy(list.begin(), list.end(), result.begin());
   return result;
 }
 
 /// The map from a node to its parent. glTF keeps matrices column by column; their fourth row has no meaning
 /// but 0 0 0 1.
 Affine local_transform(const GltfObject& node) {
-  const Affine parts = from_parts(node);
+  const Affine parts = affine_of(parts_of(node));
   const std::vector<double> m = numbers(node, "matrix", 16);
   if (m.empty()) return parts;
   if (m[3] != 0 || m[7] != 0 || m[11] != 0 || std::abs(m[15] - 1) >= 1e-6)
@@ -284,6 +272,34 @@ void choose_scene(const GltfObject& root, GltfModel& model) {
 }
 
 }  // namespace
+
+GltfParts parts_of(const GltfObject& node) {
+  GltfParts parts;
+  parts.translation = part<3>(node, "translation");
+  parts.scale = part<3>(node, "scale");
+  parts.rotation = part<4>(node, "rotation");
+  if (parts.rotation == std::array<double, 4>{})
+    throw GltfError(node.path("rotation") + " is zero, which is no rotation");
+  return parts;
+}
+
+// A quaternion stored in decimal is never quite of length 1; dividing by its length leaves a rotation.
+Affine affine_of(const GltfParts& parts) {
+  Affine result = kIdentity;
+  if (parts.rotation) {
+    const auto [x, y, z, w] = *parts.rotation;
+    const double f = 2 / (x * x + y * y + z * z + w * w);
+    result = {{{1 - f * (y * y + z * z), f * (x * y - z * w), f * (x * z + y * w), 0},
+               {f * (x * y + z * w), 1 - f * (x * x + z * z), f * (y * z - x * w), 0},
+               {f * (x * z - y * w), f * (y * z + x * w), 1 - f * (x * x + y * y), 0}}};
+  }
+  for (std::size_t row = 0; row < 3; ++row) {
+    for (std::size_t column = 0; column < 3 && parts.scale; ++column)
+      result[row][column] *= (*parts.scale)[column];
+    if (parts.translation) result[row][3] = (*parts.translation)[row];
+  }
+  return result;
+}
 
 std::string percent_decoded(std::string_view text) {
   constexpr std::size_t kEscape = 3;  // "%20"

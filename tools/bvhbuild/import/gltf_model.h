@@ -1,4 +1,5 @@
 #pragma once
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <map>
@@ -64,7 +65,7 @@ struct GltfAccessor {
   std::uint64_t offset = 0;
   std::uint64_t count = 0;
   int component_type = 0;  ///< glTF's number, see ComponentType
-  int components = 0;      ///< 1 of a SCALAR, 3 of a VEC3
+  int components = 0;      ///< 1 of a SCALAR, 3 of a VEC3, 16 of a MAT4
   bool normalized = false;
   std::optional<GltfSparse> sparse;
 };
@@ -80,6 +81,12 @@ struct GltfMesh {
   std::string name;
   std::vector<GltfPrimitive> primitives;
   bool has_morph_weights = false;  ///< that differ from zero
+};
+
+/// The parts of a node's transform that the file gives.
+struct GltfParts {
+  std::optional<std::array<double, 3>> translation, scale;
+  std::optional<std::array<double, 4>> rotation;  ///< a quaternion x y z w, of any length but 0
 };
 
 struct GltfNode {
@@ -103,6 +110,13 @@ struct GltfModel {
   std::vector<std::string> remarks;  ///< for the report, at most a few
   std::vector<std::string> files;    ///< that buffers lie in
 };
+
+/// Reads the parts of a node's transform. Throws a GltfError for lists of a wrong length and for a rotation
+/// that is none.
+GltfParts parts_of(const GltfObject& node);
+
+/// The map that scales, then rotates, then translates. Parts that are left out stay out of the arithmetic.
+Affine affine_of(const GltfParts& parts);
 
 /// Reads the model out of a glTF file's JSON, and the buffers from where they are.
 ///

@@ -5,78 +5,15 @@
 
 #include "common/printable.h"
 #include "gltf_accessor.h"
-#include "gltf_model.h"
+#include "gltf_scene.h"
 #include "mesh_assembly.h"
 #include "readers.h"
 
 namespace tandem::build {
 namespace {
 
-enum Mode { kPoints = 0, kTriangles = 4, kTriangleStrip = 5, kTriangleFan = 6 };
-
 constexpr std::uint64_t kMostCorners = kNoVertex - 1;
 constexpr int kMostRemarksOfAKind = 4;
-constexpr std::size_t kLongEnough = 2000;  ///< of names, more than any report shows
-
-std::string described(const char* list, std::size_t index, std::string_view name) {
-  return name.empty() ? numbered(list, index) : numbered(list, index) + " " + in_quotes(name);
-}
-
-/// Nodes and meshes without a name are told apart by their number. Nobody sees the end of a long name.
-std::string name_or_number(const std::string& name, const char* list, std::size_t index) {
-  return name.empty() ? numbered(list, index) : name.substr(0, kLongEnough);
-}
-
-/// The place of a node. Below a long path, nodes share it.
-struct Place {
-  Affine world = kIdentity;
-  std::shared_ptr<const std::string> path = std::make_shared<std::string>();
-};
-
-Place child_place(const Place& parent, const GltfNode& node, std::size_t index) {
-  Place place{combined(parent.world, node.local), parent.path};
-  if (parent.path->size() < kLongEnough)
-    place.path = std::make_shared<std::string>(*parent.path + (parent.path->empty() ? "" : "/") +
-                                               name_or_number(node.name, "nodes", index));
-  return place;
-}
-
-/// A node on the way through the forest. The way is kept in a list: trees of hostile files are deeper than a
-/// stack.
-struct Step {
-  int node;
-  std::shared_ptr<const Place> parent;
-};
-
-void push_backwards(const std::vector<int>& nodes, const std::shared_ptr<const Place>& parent,
-                    std::vector<Step>& pending) {
-  for (std::size_t i = nodes.size(); i-- > 0;) pending.push_back({nodes[i], parent});
-}
-
-/// Calls `visit(index, place)` for all nodes of the scene, depth first. No node is visited twice, so the way
-/// ends.
-template <class Visit>
-void walk(const GltfModel& model, const Visit& visit) {
-  std::vector<bool> seen(model.nodes.size());
-  std::vector<Step> pending;
-  push_backwards(model.roots, std::make_shared<Place>(), pending);
-  while (!pending.empty()) {
-    const Step step = std::move(pending.back());
-    pending.pop_back();
-    const auto index = static_cast<std::size_t>(step.node);
-    if (step.node < 0 || index >= model.nodes.size())
-      throw GltfError(numbered("nodes", index) + " is named, but there are " +
-                      std::to_string(model.nodes.size()));
-    const GltfNode& node = model.nodes[index];
-    if (seen[index])
-      throw GltfError(described("nodes", index, node.name) +
-                      " is reached twice: nodes must form trees, without cycles and second parents");
-    seen[index] = true;
-    const auto place = std::make_shared<const Place>(child_place(*step.parent, node, index));
-    visit(index, *place);
-    push_backwards(node.children, place, pending);
-  }
-}
 
 /// The counts that a mesh adds to the result each time that a node shows it.
 struct Size {
@@ -85,40 +22,26 @@ struct Size {
   std::uint64_t primitives = 0;  ///< which take time even where they add nothing
 };
 
-bool has_triangles(const GltfPrimitive& primitive) {
-  return primitive.mode >= kTriangles && primitive.mode <= kTriangleFan;
-}
-
 std::uint64_t triangles_of(int mode, std::uint64_t vertices) {
   if (mode == kTriangles) return vertices / 3;
   return vertices < 3 ? 0 : vertices - 2;
 }
 
-/// Calls `use(primitive, name)` for the primitives of a mesh; errors begin with the name.
-template <class Use>
-void each_primitive(const GltfMesh& mesh, std::size_t index, const Use& use) {
-  for (std::size_t i = 0; i < mesh.primitives.size(); ++i) {
-    const std::string name = described("meshes", index, mesh.name) + ", primitive " + std::to_string(i);
-    try {
-      use(mesh.primitives[i], name);
-    } catch (const GltfError& error) {
-      throw GltfError(name + ": " + error.what());
-    }
-  }
-}
-
 class SceneReader {
  public:
-  SceneReader(const GltfModel& model, const ReadLimits& limits)
-      : model_(model), limits_(limits), out_("tandem glTF", kMostNameBytes) {}
+  SceneReader(const GltfModel& model, const ReadLimits& limits, bool is_posed_later)
+      : model_(model),
+        limits_(limits),
+        out_("tandem glTF", kMostNameBytes),
+        is_posed_later_(is_posed_later) {}
 
   /// Measures before anything is stored: a small file can show a mesh a million times.
   ReadResult read() {
     for (const std::string& remark : model_.remarks) out_.remark(remark);
-    walk(model_, [this](std::size_t node, const Place&) { measure_node(node); });
+    walk_scene(model_, [this](std::size_t node, const GltfPlace&) { measure_node(node); });
     out_.reserve_points(total_.points);
     out_.reserve_faces(total_.triangles, 3 * total_.triangles);
-    walk(model_, [this](std::size_t node, const Place& place) { add_node(node, place); });
+    walk_scene(model_, [this](std::size_t node, const GltfPlace& place) { add_node(node, place); });
     return out_.finish();
   }
 
@@ -201,7 +124,8 @@ class SceneReader {
 
   void remark_pose(const GltfNode& node, const std::string& name) {
     const bool is_morphed = node.has_morph_weights || model_.meshes[node.mesh].has_morph_weights;
-    if (pose_remarked_ || !(node.has_skin || is_morphed || node.is_instanced)) return;
+    const bool stays_unposed = !is_posed_later_ && (node.has_skin || is_morphed);
+    if (pose_remarked_ || !(stays_unposed || node.is_instanced)) return;
     pose_remarked_ = true;
     if (node.is_instanced)
       out_.remark(name + " repeats its mesh by EXT_mesh_gpu_instancing; it is read once");
@@ -210,7 +134,7 @@ class SceneReader {
                   (node.has_skin ? "unposed" : "unmorphed"));
   }
 
-  void add_node(std::size_t node_index, const Place& place) {
+  void add_node(std::size_t node_index, const GltfPlace& place) {
     if (model_.nodes[node_index].mesh == -1) return;
     const auto index = static_cast<std::size_t>(model_.nodes[node_index].mesh);
     const GltfMesh& mesh = model_.meshes[index];
@@ -275,26 +199,19 @@ class SceneReader {
   std::map<std::size_t, Size> sizes_;  ///< of the meshes that nodes show
   Size total_;
   int remarks_ = 0;
+  bool is_posed_later_;
   bool pose_remarked_ = false;
   std::vector<Point> points_;           ///< of the primitive at hand
   std::vector<std::uint32_t> indices_;  ///< of the primitive at hand
 };
 
-GltfModel read_model(std::string_view bytes, const std::filesystem::path& folder, const ReadLimits& limits) {
-  const GltfContainer file = open_gltf_container(bytes);
-  const nlohmann::json json = parse_gltf_json(file.json, limits.memory_bytes);
-  GltfModel model = read_gltf_model(
-      GltfObject(json), {folder, file.is_binary, file.chunk, limits.memory_bytes, limits.outside_files});
-  model.bytes_held += bytes.size();
-  return model;
-}
-
 }  // namespace
 
-ReadResult read_gltf(std::string_view bytes, const std::filesystem::path& folder, const ReadLimits& limits) {
+ReadResult read_gltf(std::string_view bytes, const std::filesystem::path& folder, const ReadLimits& limits,
+                     bool is_posed_later) {
   try {
-    const GltfModel model = read_model(bytes, folder, limits);
-    ReadResult result = SceneReader(model, limits).read();
+    const GltfModel model = parse_gltf(bytes, folder, limits).model;
+    ReadResult result = SceneReader(model, limits, is_posed_later).read();
     result.files = model.files;
     return result;
   } catch (const GltfError& error) {

@@ -55,12 +55,14 @@ ReadResult read_off(std::string_view bytes);
 /// Positions keep their float32, transforms their float64 value. A part is one mesh at one node. Triangles,
 /// strips and fans become faces; points and lines none. A strip's triangle that names a vertex twice only
 /// leads the strip elsewhere and is no face. An index that names no vertex of its primitive becomes
-/// kNoVertex. Skins and morph targets are not applied. Images are never looked at.
-/// Memory and time are small multiples of what the file and its buffers hold, and of `limits.expansion`.
-/// Errors: what is no glTF; buffers that are missing or too short, by name; accessors that reach outside
-/// their buffers; nodes that are no tree; extensions that hide the triangles from us, by name; and, before
-/// any memory is taken, more vertices and corners, counting each instance, than `limits` or 2^32 - 2 allow.
-ReadResult read_gltf(std::string_view bytes, const std::filesystem::path& folder, const ReadLimits& limits);
+/// kNoVertex. Skins and morph targets are not applied, which a remark says unless `is_posed_later`. Images
+/// are never looked at. Memory and time are small multiples of what the file and its buffers hold, and of
+/// `limits.expansion`. Errors: what is no glTF; buffers that are missing or too short, by name; accessors
+/// that reach outside their buffers; nodes that are no tree; extensions that hide the triangles from us, by
+/// name; and, before any memory is taken, more vertices and corners, counting each instance, than `limits` or
+/// 2^32 - 2 allow.
+ReadResult read_gltf(std::string_view bytes, const std::filesystem::path& folder, const ReadLimits& limits,
+                     bool is_posed_later = false);
 
 /// Reads a mesh file with assimp in a child process under the limits of `options`, so that its crashes,
 /// endless loops and appetite become errors: "assimp crashed (signal 11)". Must be called while the process

@@ -45,6 +45,12 @@ std::uint32_t source_of(const TriangleMesh& mesh, std::size_t point) {
   return mesh.source_vertex.empty() ? static_cast<std::uint32_t>(point) : mesh.source_vertex[point];
 }
 
+/// Returns whether two points lie at the same place in all poses.
+bool stay_together(const TriangleMesh& mesh, std::size_t a, std::size_t b) {
+  return std::all_of(mesh.poses.begin(), mesh.poses.end(),
+                     [&](const std::vector<Point>& pose) { return pose[a] == pose[b]; });
+}
+
 /// Points move to the front as they are found to be new, which never overtakes the reading: a new index is at
 /// most the old.
 void weld(TriangleMesh& mesh, CleanReport& report) {
@@ -53,19 +59,25 @@ void weld(TriangleMesh& mesh, CleanReport& report) {
   std::uint32_t kept = 0;
   std::uint64_t used = 0;
   std::vector<std::uint32_t> source_vertex;
-  const auto hash = [&](std::size_t i) { return hash_place(normalised(mesh.points[i])); };
+  const auto hash = [&](std::size_t i) {
+    std::uint64_t hash_i = hash_place(normalised(mesh.points[i]));
+    for (const auto& pose : mesh.poses) hash_i = hash_words(hash_i, hash_place(normalised(pose[i])), 0);
+    return hash_i;
+  };
   for_each_prefetched(mesh.points.size(), table, hash, [&](std::uint32_t i, std::uint64_t hash_i) {
     if (new_index[i] == kNoVertex) return;
     ++used;
     const Point place = normalised(mesh.points[i]);
-    new_index[i] =
-        table.find_or_insert(hash_i, kept, [&](std::uint32_t k) { return mesh.points[k] == place; });
+    new_index[i] = table.find_or_insert(
+        hash_i, kept, [&](std::uint32_t k) { return mesh.points[k] == place && stay_together(mesh, k, i); });
     if (new_index[i] != kept) return;
+    for (auto& pose : mesh.poses) pose[kept] = pose[i];
     mesh.points[kept++] = place;
     source_vertex.push_back(source_of(mesh, i));
   });
   mesh.points.resize(kept);
   mesh.points.shrink_to_fit();
+  for (auto& pose : mesh.poses) pose.resize(kept);
   mesh.source_vertex = std::move(source_vertex);
   rename_corners(mesh, new_index);
   report.vertices_welded += used - kept;
@@ -73,7 +85,8 @@ void weld(TriangleMesh& mesh, CleanReport& report) {
 
 bool degenerate(const TriangleMesh& mesh, const TriangleIndices& t) {
   if (t[0] == t[1] || t[1] == t[2] || t[2] == t[0]) return true;
-  return collinear(mesh.points[t[0]], mesh.points[t[1]], mesh.points[t[2]]);
+  const auto flat_in = [&](const std::vector<Point>& p) { return collinear(p[t[0]], p[t[1]], p[t[2]]); };
+  return flat_in(mesh.points) && std::all_of(mesh.poses.begin(), mesh.poses.end(), flat_in);
 }
 
 void drop_degenerate(TriangleMesh& mesh, CleanReport& report) {
@@ -99,11 +112,13 @@ void drop_unused_points(TriangleMesh& mesh) {
     if (new_index[i] == kNoVertex) continue;
     mesh.points[kept] = mesh.points[i];
     mesh.source_vertex[kept] = mesh.source_vertex[i];
+    for (auto& pose : mesh.poses) pose[kept] = pose[i];
     new_index[i] = kept++;
   }
   if (kept == mesh.points.size()) return;
   mesh.points.resize(kept);
   mesh.source_vertex.resize(kept);
+  for (auto& pose : mesh.poses) pose.resize(kept);
   rename_corners(mesh, new_index);
 }
 

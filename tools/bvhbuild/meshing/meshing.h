@@ -51,6 +51,8 @@ struct TriangleMesh {
   std::vector<std::uint32_t> face;  ///< of each triangle: the face of the file that it is a piece of
   /// Of each point: the vertex of the file, ascending. Empty: point i is vertex i.
   std::vector<std::uint32_t> source_vertex{};
+  /// Where the points are in other samples of an animation: finite and at most kMaxCoordinate in magnitude.
+  std::vector<std::vector<Point>> poses{};
 };
 
 /// Returns whether a face can be split into triangles: its indices are in range, it has three corners or
@@ -104,7 +106,9 @@ std::optional<std::size_t> first_face_beyond_quads(const PolygonMesh& mesh);
 ///
 /// Effect on `mesh`: vertices at exactly the same place become one (the first; -0.0 becomes 0.0); triangles
 /// whose corners lie exactly on one line in the float64 coordinates go; vertices that no triangle uses go.
-/// Order is kept otherwise. source_vertex says which vertices these were.
+/// Order is kept otherwise. source_vertex says which vertices these were. Where there are poses, only
+/// vertices that lie at the same place in all of them become one, and only triangles that are flat in all of
+/// them go.
 ///
 /// Effect on `report`: counts those, and the triangles that repeat an earlier one, which stay.
 ///
@@ -117,8 +121,9 @@ struct StoredMesh {
   Point origin{};                            ///< float64; zero when every coordinate is a float32 number
   std::vector<std::array<float, 3>> points;  ///< relative to origin, finite
   std::vector<TriangleIndices> triangles;
-  std::vector<std::uint32_t> face;             ///< source face of each triangle
-  std::vector<std::uint32_t> source_vertex{};  ///< of each point, ascending
+  std::vector<std::uint32_t> face;                         ///< source face of each triangle
+  std::vector<std::uint32_t> source_vertex{};              ///< of each point, ascending
+  std::vector<std::vector<std::array<float, 3>>> poses{};  ///< relative to origin, rounded as points are
   double largest_rounding_error = 0;  ///< of any coordinate: |origin + point - vertex|, in the file's unit
 };
 

@@ -6,6 +6,7 @@
 
 #include "exact_predicates.h"
 #include "parallel/parallel.h"
+#include "tandem/formats/box.h"
 
 namespace tandem::build {
 namespace {
@@ -95,6 +96,18 @@ void round_points(const TriangleMesh& mesh, StoredMesh& out) {
     }
 }
 
+// A pose is looked at for its shape alone, so what float32 cannot hold may come to lie at its limit.
+std::vector<std::array<float, 3>> rounded_pose(const std::vector<Point>& pose, const Point& origin) {
+  std::vector<std::array<float, 3>> out(pose.size());
+  for (std::size_t i = 0; i < pose.size(); ++i) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      constexpr double kMost = double{kMaxCoordinate};
+      out[i][k] = static_cast<float>(std::clamp(pose[i][k] - origin[k], -kMost, kMost));
+    }
+  }
+  return out;
+}
+
 Point widened(const std::array<float, 3>& p) {
   return {p[0], p[1], p[2]};
 }
@@ -116,7 +129,9 @@ StoredMesh to_single_precision(TriangleMesh& mesh, CleanReport& report) {
   StoredMesh out;
   out.origin = choose_origin(mesh);
   round_points(mesh, out);
+  for (const auto& pose : mesh.poses) out.poses.push_back(rounded_pose(pose, out.origin));
   mesh.points = {};
+  mesh.poses = {};
   out.triangles = std::move(mesh.triangles);
   out.face = std::move(mesh.face);
   out.source_vertex = std::move(mesh.source_vertex);

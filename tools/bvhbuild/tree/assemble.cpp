@@ -242,7 +242,7 @@ LevelParts build_parts(const Geometry& geometry, const BuildOptions& options, Op
   parallel::invoke(  // topology takes one thread, about as long as a fast search
       [&] {
         if (options.topology && triangles < kMostTopologyTriangles)
-          parts.topology = make_topology(geometry, parts.tree);
+          parts.topology = make_topology(options.refit ? geometry : geometry.sample(0), parts.tree);
       },
       [&] {
         if (options.gpu_blocks && triangles < kMostOrientedTriangles)

@@ -52,8 +52,9 @@ struct LevelParts {
   std::optional<SurfaceTopology> topology;
 };
 
-/// Builds what the options ask for, as far as there are not too many triangles for it. The result does not
-/// depend on the number of threads.
+/// Builds what the options ask for, as far as there are not too many triangles for it. Vertices that lie
+/// together and part in a pose stay apart only where the tree can be refitted: other files may not have such.
+/// The result does not depend on the number of threads.
 LevelParts build_parts(const Geometry& geometry, const BuildOptions& options, OptimisationWatch& watch);
 
 /// Assembles a file and has the checker prove it: what is written, every program can load. Throws

@@ -5,6 +5,20 @@
 
 namespace tandem::build {
 
+std::vector<std::size_t> spread_first(std::size_t count, std::size_t first) {
+  const std::size_t spread = std::min(count, first);
+  std::vector<bool> is_taken(count);
+  std::vector<std::size_t> numbers;
+  for (std::size_t i = 0; i < spread; ++i) {
+    numbers.push_back(i * count / spread);
+    is_taken[numbers.back()] = true;
+  }
+  for (std::size_t number = 0; number < count; ++number) {
+    if (!is_taken[number]) numbers.push_back(number);
+  }
+  return numbers;
+}
+
 std::vector<Bounds> normalized_bounds(const Geometry& geometry) {
   const CornerBounds all = corner_bounds(geometry);
   double longest = 0;

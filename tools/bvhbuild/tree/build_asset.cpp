@@ -46,6 +46,7 @@ BuiltAsset build_asset(const TriangleSource& given, const BuildOptions& options,
   const parallel::ThreadLimit limit(options.threads);
   BuiltAsset built;
   TriangleMesh triangles = take_triangles(given.points, given.triangles, given.face, built.clean);
+  triangles.poses.assign(given.poses.begin(), given.poses.end());
   clean(triangles, built.clean);
   const StoredMesh mesh = to_single_precision(triangles, built.clean);
   if (mesh.triangles.empty()) return built;
@@ -57,7 +58,7 @@ BuiltAsset build_asset(const TriangleSource& given, const BuildOptions& options,
   source.source_vertices = given.points.size();
   const SourcePart whole = {{}, {}, 0, source.source_faces};
   source.parts = given.parts.empty() ? std::span(&whole, 1) : given.parts;
-  const Geometry geometry{mesh.points, mesh.triangles};
+  const Geometry geometry{mesh.points, mesh.triangles, mesh.poses};
   const LevelParts parts = build_parts(geometry, options, watch);
   source.provenance =
       provenance.empty() ? usual_provenance(options, built.clean, watch.stop) : std::move(provenance);

@@ -42,9 +42,10 @@ class Random {
 // The first temperature, in mean costs of a block: hotter ones lose with so few trials.
 constexpr double kHottest = 0.15;
 
+template <typename Bounds>
 class Annealing {
  public:
-  Annealing(WorkingTree& tree, ExchangeSearch& search, const Region& region)
+  Annealing(WorkingTree<Bounds>& tree, ExchangeSearch<Bounds>& search, const Region& region)
       : tree_(tree),
         search_(search),
         region_(region),
@@ -98,8 +99,8 @@ class Annealing {
 
   static constexpr int kMostUp = 6;
 
-  WorkingTree& tree_;
-  ExchangeSearch& search_;
+  WorkingTree<Bounds>& tree_;
+  ExchangeSearch<Bounds>& search_;
   const Region& region_;
   Random random_;
 };
@@ -108,15 +109,16 @@ class Annealing {
 // they cost a little, less and less of it as time goes on. Ends with passes of the search. The region is left
 // as it was where that did not make it cheaper, or where it was stopped too early to. Source: Kirkpatrick,
 // Gelatt and Vecchi 1983.
-void anneal(WorkingTree& tree, ExchangeSearch& search, const Region& region, std::uint32_t trials_per_child,
-            OptimisationWatch& watch) {
+template <typename Bounds>
+void anneal(WorkingTree<Bounds>& tree, ExchangeSearch<Bounds>& search, const Region& region,
+            std::uint32_t trials_per_child, OptimisationWatch& watch) {
   if (region.blocks.size() < 3) return;
-  std::vector<WorkingTree::Block> before;
+  std::vector<typename WorkingTree<Bounds>::Block> before;
   for (const std::uint32_t block : region.blocks) before.push_back(tree[block]);
   const double cost_before = cost_of(tree, region);
   const double mean = cost_before / static_cast<double>(region.blocks.size() - 1);
 
-  Annealing annealing(tree, search, region);
+  Annealing<Bounds> annealing(tree, search, region);
   const std::uint64_t trials = std::uint64_t{trials_per_child} * region.children.size();
   const double hottest = mean * kHottest;
   constexpr std::uint64_t kChunk = 1 << 14;
@@ -141,6 +143,7 @@ constexpr std::uint64_t kTrialsPerChild = 6000, kMostTrials = 1'500'000'000;
 // Passes over all that best effort makes at its end; they seldom find anything after the fourth.
 constexpr int kMostPasses = 8;
 
+template <typename Bounds>
 class Optimiser {
  public:
   Optimiser(const Topology& topology, std::span<const Bounds> bounds, OptimisationWatch& watch)
@@ -151,7 +154,7 @@ class Optimiser {
   void exchange_in_regions(bool is_all) {
     const std::vector<Region> regions = cut_into_regions(tree_, kRegionTriangles);
     if (is_all) watch_.expect(children_of(regions));
-    const auto pass = [&](ExchangeSearch& search, const Region& region) {
+    const auto pass = [&](ExchangeSearch<Bounds>& search, const Region& region) {
       if (watch_.stop) return;
       search.pass(region);
       watch_.count(is_all ? region.children.size() : 0);
@@ -166,7 +169,7 @@ class Optimiser {
     const std::uint64_t trials =
         std::min(kTrialsPerChild, kMostTrials / std::max<std::uint64_t>(children, 1));
     watch_.expect(trials * children);
-    for_each_below(regions, [&](ExchangeSearch& search, const Region& region) {
+    for_each_below(regions, [&](ExchangeSearch<Bounds>& search, const Region& region) {
       anneal(tree_, search, region, static_cast<std::uint32_t>(trials), watch_);
     });
   }
@@ -194,19 +197,20 @@ class Optimiser {
   void for_each_below(const std::vector<Region>& regions, const Body& body) {
     const std::size_t count = regions.size() - has_top(regions);
     parallel::for_each(
-        count, [&] { return ExchangeSearch(tree_); },
-        [&](ExchangeSearch& search, std::size_t i) { body(search, regions[i]); });
+        count, [&] { return ExchangeSearch<Bounds>(tree_); },
+        [&](ExchangeSearch<Bounds>& search, std::size_t i) { body(search, regions[i]); });
     for (std::size_t i = 0; i < count; ++i) tree_.refresh_heights(regions[i].root);
   }
 
-  WorkingTree tree_;
-  ExchangeSearch search_;
+  WorkingTree<Bounds> tree_;
+  ExchangeSearch<Bounds> search_;
   OptimisationWatch& watch_;
 };
 
 }  // namespace
 
-std::uint32_t ExchangeSearch::pass(const Region& region) {
+template <typename Bounds>
+std::uint32_t ExchangeSearch<Bounds>::pass(const Region& region) {
   const std::uint64_t budget = kMostBlocksPerChild * region.children.size();
   std::uint32_t made = 0;
   searched_ = 0;
@@ -220,7 +224,8 @@ std::uint32_t ExchangeSearch::pass(const Region& region) {
 // Branch and bound after Bittner, Hapala and Havran 2013, for an exchange instead of an insertion: what is
 // saved is at most what the child's absence saves, plus what its partner's does; the latter is left out of
 // the bound, which loses little (docs/decisions/trees.md) and keeps searches short.
-bool ExchangeSearch::improve(Child child, const Region& region) {
+template <typename Bounds>
+bool ExchangeSearch<Bounds>::improve(Child child, const Region& region) {
   const std::uint32_t parent = tree_.parent_of(child);
   if (tree_[parent].count < 2) return false;
   const double gain = -tree_.cost_change(parent, child.index, Bounds(), region.root);
@@ -242,8 +247,9 @@ bool ExchangeSearch::improve(Child child, const Region& region) {
   return true;
 }
 
-void ExchangeSearch::try_places_of(std::uint32_t block, Exchange exchange, double gain, Exchange& best,
-                                   double& least) const {
+template <typename Bounds>
+void ExchangeSearch<Bounds>::try_places_of(std::uint32_t block, Exchange exchange, double gain,
+                                           Exchange& best, double& least) const {
   const int places = std::min(tree_[block].count + 1, kNodesPerBlock);
   for (int i = 0; i < places; ++i) {
     exchange.second =
@@ -256,8 +262,9 @@ void ExchangeSearch::try_places_of(std::uint32_t block, Exchange exchange, doubl
   }
 }
 
-void ExchangeSearch::descend(const Waiting& at, Child child, double gain) {
-  const WorkingTree::Block& self = tree_[at.block];
+template <typename Bounds>
+void ExchangeSearch<Bounds>::descend(const Waiting& at, Child child, double gain) {
+  const typename WorkingTree<Bounds>::Block& self = tree_[at.block];
   for (int i = 0; i < self.count && !self.is_leaf_block; ++i) {
     const std::uint32_t next = self.child[i];
     if (!child.is_triangle && (next == child.index || tree_[next].is_leaf_block)) continue;
@@ -271,7 +278,8 @@ void ExchangeSearch::descend(const Waiting& at, Child child, double gain) {
   }
 }
 
-void ExchangeSearch::mark_ancestors(std::uint32_t block, const Region& region) {
+template <typename Bounds>
+void ExchangeSearch<Bounds>::mark_ancestors(std::uint32_t block, const Region& region) {
   ++stamp_;
   std::uint32_t depth = region.depth;
   for (std::uint32_t b = block; b != region.root; b = tree_[b].parent) ++depth;
@@ -281,7 +289,8 @@ void ExchangeSearch::mark_ancestors(std::uint32_t block, const Region& region) {
   }
 }
 
-double ExchangeSearch::cost_change(const Exchange& exchange, const Region& region) {
+template <typename Bounds>
+double ExchangeSearch<Bounds>::cost_change(const Exchange& exchange, const Region& region) {
   if (exchange.first_parent == exchange.second_parent) return kImpossible;
   if (exchange.second.index == kNoIndex && tree_[exchange.first_parent].count < 2) return kImpossible;
   mark_ancestors(exchange.first_parent, region);
@@ -290,7 +299,8 @@ double ExchangeSearch::cost_change(const Exchange& exchange, const Region& regio
 
 // Condition: the ancestors of the first parent are marked. Gives up where the second parent's side alone
 // costs `limit`.
-double ExchangeSearch::change_by(const Exchange& exchange, double limit) const {
+template <typename Bounds>
+double ExchangeSearch<Bounds>::change_by(const Exchange& exchange, double limit) const {
   const bool blocks = !exchange.first.is_triangle, both = exchange.second.index != kNoIndex;
   if (blocks && both && is_marked(exchange.second.index)) return kImpossible;
   std::uint32_t common = exchange.second_parent, below_common = 0;
@@ -327,9 +337,11 @@ void OptimisationWatch::tell(double share_of_part) {
   progress(told_);
 }
 
-void optimise(Topology& topology, std::span<const Bounds> bounds, Effort effort, OptimisationWatch& watch) {
+template <typename Bounds>
+void optimise(Topology& topology, const std::vector<Bounds>& bounds, Effort effort,
+              OptimisationWatch& watch) {
   if (effort == Effort::fast || topology.size() < 3) return;
-  Optimiser optimiser(topology, bounds, watch);
+  Optimiser<Bounds> optimiser(topology, bounds, watch);
   optimiser.exchange_in_regions(effort == Effort::standard);
   if (effort == Effort::best) {
     optimiser.exchange_everywhere();
@@ -338,5 +350,11 @@ void optimise(Topology& topology, std::span<const Bounds> bounds, Effort effort,
   }
   topology = optimiser.topology();
 }
+
+#define TANDEM_INSTANTIATE(Bounds)       \
+  template class ExchangeSearch<Bounds>; \
+  template void optimise(Topology&, const std::vector<Bounds>&, Effort, OptimisationWatch&);
+TANDEM_FOR_EACH_BOUNDS(TANDEM_INSTANTIATE)
+#undef TANDEM_INSTANTIATE
 
 }  // namespace tandem::build

@@ -11,20 +11,42 @@
 namespace tandem::build {
 namespace {
 
-// Calls body(0), body(1), body(2), at once if the group is large.
+// Calls body(0), body(1), ... for so many orders, at once if the group is large.
 template <typename Body>
-void for_each_axis(Range range, const Body& body) {
+void for_each_order(int orders, Range range, const Body& body) {
   if (range.size() < kSerialSize) {
-    for (int axis = 0; axis < 3; ++axis) body(axis);
+    for (int axis = 0; axis < orders; ++axis) body(axis);
   } else {
-    parallel::for_each(3, [&](std::size_t axis) { body(static_cast<int>(axis)); });
+    parallel::for_each(static_cast<std::size_t>(orders),
+                       [&](std::size_t axis) { body(static_cast<int>(axis)); });
   }
 }
 
 constexpr int kBins = 32;
 constexpr std::size_t kGrain = 1 << 15;
 
-// Says how centres along one axis fall into bins.
+// The least and greatest centre in each order.
+template <int kOrders>
+struct CentreRange {
+  float lo[kOrders], hi[kOrders];
+
+  CentreRange() {
+    std::fill_n(lo, kOrders, std::numeric_limits<float>::infinity());
+    std::fill_n(hi, kOrders, -std::numeric_limits<float>::infinity());
+  }
+  void grow(int order, float centre) {
+    lo[order] = std::min(lo[order], centre);
+    hi[order] = std::max(hi[order], centre);
+  }
+  void grow(const CentreRange& other) {
+    for (int k = 0; k < kOrders; ++k) {
+      lo[k] = std::min(lo[k], other.lo[k]);
+      hi[k] = std::max(hi[k], other.hi[k]);
+    }
+  }
+};
+
+// Says how centres in one order fall into bins.
 struct Binning {
   float lo = 0, scale = 0;
 
@@ -35,15 +57,18 @@ struct Binning {
   }
 };
 
+template <typename Bounds>
 struct Bin {
   Bounds bounds;
   std::uint32_t count = 0;
 };
 
-using Bins = std::array<std::array<Bin, kBins>, 3>;
+template <typename Bounds>
+using Bins = std::array<std::array<Bin<Bounds>, kBins>, Bounds::kOrders>;
 
-void merge(Bins& into, const Bins& from) {
-  for (int axis = 0; axis < 3; ++axis) {
+template <typename Bounds>
+void merge(Bins<Bounds>& into, const Bins<Bounds>& from) {
+  for (int axis = 0; axis < Bounds::kOrders; ++axis) {
     for (int b = 0; b < kBins; ++b) {
       into[axis][b].bounds.grow(from[axis][b].bounds);
       into[axis][b].count += from[axis][b].count;
@@ -80,8 +105,7 @@ void sort_by_centre(std::vector<std::uint64_t>& keys, std::vector<std::uint64_t>
 
 // The legal split nearest to `wanted`; legal ones lie at most 12 apart away from the ends. 0 if there is none
 // so near.
-std::uint32_t nearest_legal(std::uint32_t wanted, std::uint32_t n,
-                            const TriangleSplitter::IsLegal& is_legal) {
+std::uint32_t nearest_legal(std::uint32_t wanted, std::uint32_t n, const IsLegal& is_legal) {
   for (std::uint32_t distance = 0; distance <= 16; ++distance) {
     if (wanted > distance && is_legal(wanted - distance)) return wanted - distance;
     if (wanted + distance < n && is_legal(wanted + distance)) return wanted + distance;
@@ -91,8 +115,9 @@ std::uint32_t nearest_legal(std::uint32_t wanted, std::uint32_t n,
 
 // The cheapest split of one axis between two bins. The few triangles between a bin's edge and the nearest
 // legal split hardly change the costs, so those of the bins stand for them.
-Split best_of(int axis, const std::array<Bin, kBins>& bins, std::uint32_t n,
-              const TriangleSplitter::IsLegal& is_legal) {
+template <typename Bounds>
+Split best_of(int axis, const std::array<Bin<Bounds>, kBins>& bins, std::uint32_t n,
+              const IsLegal& is_legal) {
   float right_each[kBins];
   Bounds right;
   for (int b = kBins - 1; b > 0; --b) {
@@ -122,10 +147,11 @@ Split best_of(int axis, const std::array<Bin, kBins>& bins, std::uint32_t n,
 
 }  // namespace
 
-TriangleSplitter::TriangleSplitter(std::span<const Bounds> bounds) : bounds_(bounds) {
+template <typename Bounds>
+TriangleSplitter<Bounds>::TriangleSplitter(std::span<const Bounds> bounds) : bounds_(bounds) {
   const auto n = static_cast<std::uint32_t>(bounds.size());
   goes_left_.resize(n);
-  for (int axis = 0; axis < 3; ++axis) {
+  for (int axis = 0; axis < Bounds::kOrders; ++axis) {
     scratch_[axis].resize(n);
     order_[axis].resize(n);
   }
@@ -134,9 +160,10 @@ TriangleSplitter::TriangleSplitter(std::span<const Bounds> bounds) : bounds_(bou
 }
 
 // Fills all three orders of a group from the first.
-void TriangleSplitter::sort(Range range) {
+template <typename Bounds>
+void TriangleSplitter<Bounds>::sort(Range range) {
   const std::vector<std::uint32_t> triangles(order_[0].begin() + range.begin, order_[0].begin() + range.end);
-  for_each_axis(range, [&](int axis) {
+  for_each_order(Bounds::kOrders, range, [&](int axis) {
     std::vector<std::uint64_t> keys, scratch;
     keys.reserve(triangles.size());
     for (const std::uint32_t t : triangles) keys.push_back(key_of(centre(t, axis), t));
@@ -146,20 +173,22 @@ void TriangleSplitter::sort(Range range) {
   });
 }
 
-Split TriangleSplitter::best_split(Range range, const IsLegal& is_legal) {
+template <typename Bounds>
+Split TriangleSplitter<Bounds>::best_split(Range range, const IsLegal& is_legal) {
   if (range.size() > kSweepSize) return best_binned_split(range, is_legal);
-  Split splits[3];
-  for_each_axis(range, [&](int axis) { splits[axis] = sweep(axis, range, is_legal); });
-  return *std::min_element(splits, splits + 3,
+  Split splits[Bounds::kOrders];
+  for_each_order(Bounds::kOrders, range, [&](int axis) { splits[axis] = sweep(axis, range, is_legal); });
+  return *std::min_element(splits, splits + Bounds::kOrders,
                            [](const Split& a, const Split& b) { return a.cost < b.cost; });
 }
 
-Split TriangleSplitter::even_split(Range range, const IsLegal& is_legal) const {
+template <typename Bounds>
+Split TriangleSplitter<Bounds>::even_split(Range range, const IsLegal& is_legal) const {
   Bounds bounds;
   for (const std::uint32_t t : order(range)) bounds.grow(bounds_[t]);
   Split split;
   for (int axis = 1; axis < 3; ++axis) {
-    if (bounds.hi[axis] - bounds.lo[axis] > bounds.hi[split.axis] - bounds.lo[split.axis]) split.axis = axis;
+    if (bounds.extent(axis) > bounds.extent(split.axis)) split.axis = axis;
   }
   const std::uint32_t n = range.size(), middle = n / 2;
   for (std::uint32_t distance = 0; split.left == 0 && distance <= middle; ++distance) {
@@ -171,7 +200,8 @@ Split TriangleSplitter::even_split(Range range, const IsLegal& is_legal) const {
 }
 
 // Tries all splits along one axis: costs of right sides from the right, then of left sides from the left.
-Split TriangleSplitter::sweep(int axis, Range range, const IsLegal& is_legal) {
+template <typename Bounds>
+Split TriangleSplitter<Bounds>::sweep(int axis, Range range, const IsLegal& is_legal) {
   const std::uint32_t n = range.size();
   const std::uint32_t* order = order_[axis].data() + range.begin;
   std::uint32_t* right_cost = scratch_[axis].data() + range.begin;
@@ -199,7 +229,8 @@ Split TriangleSplitter::sweep(int axis, Range range, const IsLegal& is_legal) {
 }
 
 // Sets goes_left_ of all triangles of the group.
-void TriangleSplitter::mark_left_side(Range range, const Split& split) {
+template <typename Bounds>
+void TriangleSplitter<Bounds>::mark_left_side(Range range, const Split& split) {
   if (range.size() <= kSweepSize) {
     const std::uint32_t* sorted = order_[split.axis].data() + range.begin;
     for (std::uint32_t i = 0; i < range.size(); ++i) goes_left_[sorted[i]] = i < split.left;
@@ -214,7 +245,8 @@ void TriangleSplitter::mark_left_side(Range range, const Split& split) {
 }
 
 // Brings the left side's triangles to the front, keeping the order on both sides.
-void TriangleSplitter::partition(int axis, Range range, std::uint32_t left) {
+template <typename Bounds>
+void TriangleSplitter<Bounds>::partition(int axis, Range range, std::uint32_t left) {
   std::uint32_t* order = order_[axis].data() + range.begin;
   std::uint32_t* right = scratch_[axis].data() + range.begin;
   std::uint32_t lefts = 0, rights = 0;
@@ -229,10 +261,11 @@ void TriangleSplitter::partition(int axis, Range range, std::uint32_t left) {
   std::copy(right, right + rights, order + left);
 }
 
-void TriangleSplitter::apply(Range range, const Split& split) {
+template <typename Bounds>
+void TriangleSplitter<Bounds>::apply(Range range, const Split& split) {
   mark_left_side(range, split);
   if (range.size() <= kSweepSize) {
-    for_each_axis(range, [&](int axis) {
+    for_each_order(Bounds::kOrders, range, [&](int axis) {
       if (axis != split.axis) partition(axis, range, split.left);
     });
     return;
@@ -245,43 +278,44 @@ void TriangleSplitter::apply(Range range, const Split& split) {
 }
 
 // Unions and sums in any order give the same bits, so threads may share the work without changing the result.
-Split TriangleSplitter::best_binned_split(Range range, const IsLegal& is_legal) const {
+template <typename Bounds>
+Split TriangleSplitter<Bounds>::best_binned_split(Range range, const IsLegal& is_legal) const {
   const auto triangles = order(range);
-  const Bounds centres = parallel::reduce(
-      triangles.size(), kGrain, Bounds(),
-      [&](Bounds& bounds, std::size_t begin, std::size_t end) {
+  const auto centres = parallel::reduce(
+      triangles.size(), kGrain, CentreRange<Bounds::kOrders>(),
+      [&](CentreRange<Bounds::kOrders>& range_of, std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i != end; ++i) {
-          for (int k = 0; k < 3; ++k) {
-            const float c = centre(triangles[i], k);
-            bounds.lo[k] = std::min(bounds.lo[k], c);
-            bounds.hi[k] = std::max(bounds.hi[k], c);
-          }
+          for (int k = 0; k < Bounds::kOrders; ++k) range_of.grow(k, centre(triangles[i], k));
         }
       },
-      [](Bounds& sum, const Bounds& other) { sum.grow(other); });
-  Binning binning[3];
-  for (int k = 0; k < 3; ++k) {
+      [](auto& sum, const auto& other) { sum.grow(other); });
+  Binning binning[Bounds::kOrders];
+  for (int k = 0; k < Bounds::kOrders; ++k) {
     const float length = centres.hi[k] - centres.lo[k];
     binning[k] = {centres.lo[k], length > 0 ? static_cast<float>(kBins) / length : 0};
   }
-  const Bins bins = parallel::reduce(
-      triangles.size(), kGrain, Bins(),
-      [&](Bins& partial, std::size_t begin, std::size_t end) {
+  const auto bins = parallel::reduce(
+      triangles.size(), kGrain, Bins<Bounds>(),
+      [&](Bins<Bounds>& partial, std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i != end; ++i) {
-          for (int k = 0; k < 3; ++k) {
-            Bin& bin = partial[k][binning[k].bin(centre(triangles[i], k))];
+          for (int k = 0; k < Bounds::kOrders; ++k) {
+            Bin<Bounds>& bin = partial[k][binning[k].bin(centre(triangles[i], k))];
             bin.bounds.grow(bounds_[triangles[i]]);
             ++bin.count;
           }
         }
       },
-      merge);
+      merge<Bounds>);
   Split best;
-  for (int axis = 0; axis < 3; ++axis) {
+  for (int axis = 0; axis < Bounds::kOrders; ++axis) {
     const Split split = best_of(axis, bins[axis], range.size(), is_legal);
     if (split.cost < best.cost) best = split;
   }
   return best;
 }
+
+#define TANDEM_INSTANTIATE(Bounds) template class TriangleSplitter<Bounds>;
+TANDEM_FOR_EACH_BOUNDS(TANDEM_INSTANTIATE)
+#undef TANDEM_INSTANTIATE
 
 }  // namespace tandem::build

@@ -18,7 +18,8 @@ struct Range {
   std::uint32_t size() const { return end - begin; }
 };
 
-/// Says where a group is cut: its first `left` triangles by box centre along `axis` (ties by index) go left.
+/// Says where a group is cut: its first `left` triangles by box centre in the order `axis` (ties by index) go
+/// left. Of Bounds the orders are the three axes.
 struct Split {
   int axis = 0;
   std::uint32_t left = 0;  ///< 0: no split was found
@@ -42,18 +43,19 @@ class UnevenPenalty {
   float n_, weight_;
 };
 
-/// Finds and applies the splits of a top-down build. Different groups may be worked on by different threads;
-/// nothing depends on which, or on how many.
+/// Says whether a group may be cut behind so many triangles. Called from several threads.
+struct IsLegal {
+  std::function<bool(std::uint32_t left)> test;
+  std::uint32_t step = 1;  ///< only multiples of it may be legal
+
+  bool operator()(std::uint32_t left) const { return left % step == 0 && test(left); }
+};
+
+/// Finds and applies the splits of a top-down build. Bounds: Bounds or SampledBounds. Different groups may be
+/// worked on by different threads; nothing depends on which, or on how many.
+template <typename Bounds>
 class TriangleSplitter {
  public:
-  /// Says whether a group may be cut behind so many triangles. Called from several threads.
-  struct IsLegal {
-    std::function<bool(std::uint32_t left)> test;
-    std::uint32_t step = 1;  ///< only multiples of it may be legal
-
-    bool operator()(std::uint32_t left) const { return left % step == 0 && test(left); }
-  };
-
   /// `bounds`: of each triangle, normalized_bounds(); they must outlive the splitter.
   explicit TriangleSplitter(std::span<const Bounds> bounds);
 
@@ -76,9 +78,7 @@ class TriangleSplitter {
   void apply(Range range, const Split& split);
 
  private:
-  float centre(std::uint32_t triangle, int axis) const {
-    return bounds_[triangle].lo[axis] + bounds_[triangle].hi[axis];
-  }
+  float centre(std::uint32_t triangle, int axis) const { return bounds_[triangle].centre(axis); }
   void sort(Range range);
   Split sweep(int axis, Range range, const IsLegal& is_legal);
   Split best_binned_split(Range range, const IsLegal& is_legal) const;
@@ -86,11 +86,11 @@ class TriangleSplitter {
   void partition(int axis, Range range, std::uint32_t left);
 
   std::span<const Bounds> bounds_;
-  // A group up to kSweepSize has its triangles by centre along x, y and z. A larger one has the first order
+  // A group up to kSweepSize has its triangles by centre in all orders. A larger one has the first order
   // alone, by index, so that going through it goes through memory in order.
-  std::vector<std::uint32_t> order_[3];
+  std::vector<std::uint32_t> order_[Bounds::kOrders];
   // Bits of the right sides' costs; one side's triangles while partitioning.
-  std::vector<std::uint32_t> scratch_[3];
+  std::vector<std::uint32_t> scratch_[Bounds::kOrders];
   std::vector<std::uint8_t> goes_left_;  // by triangle
 };
 

@@ -184,23 +184,33 @@ class Enclosure {
   std::span<const std::int8_t> weight_;
 };
 
-// The first point at the position of each point.
-std::vector<std::uint32_t> first_at_position(std::span<const std::array<float, 3>> points) {
+std::uint64_t hash_position(const std::array<float, 3>& p) {
   const auto bits = [](float x) { return std::uint64_t{std::bit_cast<std::uint32_t>(x + 0.0f)}; };  // -0 is 0
+  return hash_words(bits(p[0]), bits(p[1]), bits(p[2]));
+}
+
+// The first point that lies where each point does, in all poses too.
+std::vector<std::uint32_t> first_at_position(const Geometry& geometry) {
+  const auto& points = geometry.points;
   IndexTable table(points.size());
   std::vector<std::uint32_t> first(points.size());
   const auto hash = [&](std::size_t i) {
-    return hash_words(bits(points[i][0]), bits(points[i][1]), bits(points[i][2]));
+    std::uint64_t hash_i = hash_position(points[i]);
+    for (const StoredPoints& pose : geometry.poses) hash_i = hash_words(hash_i, hash_position(pose[i]), 0);
+    return hash_i;
   };
   for_each_prefetched(points.size(), table, hash, [&](std::uint32_t i, std::uint64_t hash_i) {
-    first[i] =
-        table.find_or_insert(hash_i, i, [&](std::uint32_t other) { return points[other] == points[i]; });
+    first[i] = table.find_or_insert(hash_i, i, [&](std::uint32_t other) {
+      return points[other] == points[i] &&
+             std::all_of(geometry.poses.begin(), geometry.poses.end(),
+                         [&](const StoredPoints& pose) { return pose[other] == pose[i]; });
+    });
   });
   return first;
 }
 
 void weld(const Geometry& geometry, const Tree& tree, SurfaceTopology& surface) {
-  const std::vector<std::uint32_t> first = first_at_position(geometry.points);
+  const std::vector<std::uint32_t> first = first_at_position(geometry);
   std::vector<std::uint32_t> vertex(geometry.points.size(), kNoIndex);
   surface.triangles.reserve(tree.order.size());
   for (const std::uint32_t source : tree.order) {

@@ -23,6 +23,7 @@ struct Groups {
 };
 
 // Builds the tree with the fewest imaginary nodes.
+template <typename Bounds>
 class MinimalTree {
  public:
   explicit MinimalTree(std::span<const Bounds> bounds)
@@ -68,8 +69,7 @@ class MinimalTree {
   Groups split(Range range, std::uint32_t slots, std::uint32_t depth) {
     if (slots == 1 || range.size() <= kNodesPerBlock) return {{range}, 1};
     const LegalSplits legal(range.size(), slots);
-    const TriangleSplitter::IsLegal is_legal = {
-        [&](std::uint32_t left) { return legal.left_slots(left) != 0; }, legal.step()};
+    const IsLegal is_legal = {[&](std::uint32_t left) { return legal.left_slots(left) != 0; }, legal.step()};
     Split best;
     if (!must_split_evenly(depth, range.size())) best = splitter_.best_split(range, is_legal);
     if (best.left == 0) best = splitter_.even_split(range, is_legal);
@@ -89,7 +89,7 @@ class MinimalTree {
     return left;
   }
 
-  TriangleSplitter splitter_;
+  TriangleSplitter<Bounds> splitter_;
   Topology topology_;
 };
 
@@ -105,6 +105,7 @@ struct BinaryNode {
   std::uint8_t block_split;    // the same for the four slots of the block below this node
 };
 
+template <typename Bounds>
 class BinaryTree {
  public:
   explicit BinaryTree(std::span<const Bounds> bounds) : splitter_(bounds), nodes_(2 * bounds.size() - 1) {
@@ -143,7 +144,7 @@ class BinaryTree {
   }
 
   Split choose(Range range, std::uint32_t depth) {
-    const TriangleSplitter::IsLegal any = {[](std::uint32_t) { return true; }};
+    const IsLegal any = {[](std::uint32_t) { return true; }};
     Split best;
     if (!must_split_evenly(depth, range.size())) best = splitter_.best_split(range, any);
     return best.left != 0 ? best : splitter_.even_split(range, any);
@@ -184,10 +185,11 @@ class BinaryTree {
     }
   }
 
-  TriangleSplitter splitter_;
+  TriangleSplitter<Bounds> splitter_;
   std::vector<BinaryNode> nodes_;
 };
 
+template <typename Bounds>
 class Collapse {
  public:
   explicit Collapse(std::span<const Bounds> bounds) : binary_(bounds) {}
@@ -241,7 +243,7 @@ class Collapse {
     return block;
   }
 
-  BinaryTree binary_;
+  BinaryTree<Bounds> binary_;
   Topology topology_;
 };
 
@@ -249,7 +251,8 @@ class Collapse {
 // no freedom. The next larger ones have up to four times as many.
 constexpr std::uint32_t kFewTriangles = 64;
 
-using BuildTree = Topology (*)(std::span<const Bounds>);
+template <typename Bounds>
+using BuildTree = Topology (*)(const std::vector<Bounds>&);
 
 struct Replacement {
   std::uint32_t root = 0;  // of the subtree that it replaces
@@ -264,8 +267,9 @@ struct Replacement {
 };
 
 // Another tree over what hangs below the region's root.
-Replacement replacement_of(const WorkingTree& tree, const Region& region, std::span<const Bounds> bounds,
-                           const BuildTree& build) {
+template <typename Bounds>
+Replacement replacement_of(const WorkingTree<Bounds>& tree, const Region& region,
+                           std::span<const Bounds> bounds, BuildTree<Bounds> build) {
   std::vector<std::uint32_t> triangles;
   std::vector<Bounds> their_bounds;
   for (const Child child : region.children) {
@@ -276,7 +280,7 @@ Replacement replacement_of(const WorkingTree& tree, const Region& region, std::s
   Replacement replacement;
   replacement.root = region.root;
   replacement.topology = build(their_bounds);
-  const WorkingTree other(replacement.topology, their_bounds);
+  const WorkingTree<Bounds> other(replacement.topology, their_bounds);
   const Region whole = cut_into_regions(other, ~0u).front();
   replacement.saving = cost_of(tree, region) - cost_of(other, whole);
   replacement.more_blocks =
@@ -324,9 +328,10 @@ class Splice {
 };
 
 // The subtrees that are replaced; none lies in another.
+template <typename Bounds>
 class Replaced {
  public:
-  explicit Replaced(const WorkingTree& tree)
+  explicit Replaced(const WorkingTree<Bounds>& tree)
       : tree_(tree), instead_(tree.size(), nullptr), holds_one_(tree.size(), 0) {}
 
   bool is_free(std::uint32_t block) const {
@@ -345,14 +350,15 @@ class Replaced {
   const std::vector<const Topology*>& instead() const { return instead_; }
 
  private:
-  const WorkingTree& tree_;
+  const WorkingTree<Bounds>& tree_;
   std::vector<const Topology*> instead_;
   std::vector<std::uint8_t> holds_one_;
 };
 
 // Other trees instead of the largest subtrees of at most `most_triangles` triangles.
-void add_replacements(const WorkingTree& tree, std::span<const Bounds> bounds, std::uint32_t most_triangles,
-                      const BuildTree& build, std::vector<Replacement>& all) {
+template <typename Bounds>
+void add_replacements(const WorkingTree<Bounds>& tree, std::span<const Bounds> bounds,
+                      std::uint32_t most_triangles, BuildTree<Bounds> build, std::vector<Replacement>& all) {
   const std::vector<Region> regions = cut_into_regions(tree, most_triangles);
   const std::size_t count = regions.size() - (regions.size() > 1);  // without the blocks above them
   const std::size_t first = all.size();
@@ -371,14 +377,15 @@ void sort_by_worth(std::vector<Replacement>& replacements) {
 
 // The free tree with as many subtrees minimal as it takes, where that costs least; nothing if that does not
 // do.
-std::optional<Topology> mostly_free(std::span<const Bounds> bounds, std::int64_t most_blocks) {
+template <typename Bounds>
+std::optional<Topology> mostly_free(const std::vector<Bounds>& bounds, std::int64_t most_blocks) {
   const Topology free = build_free_tree(bounds);
-  const WorkingTree tree(free, bounds);
+  const WorkingTree<Bounds> tree(free, bounds);
   std::vector<Replacement> replacements;
-  add_replacements(tree, bounds, kFewTriangles, build_minimal_tree, replacements);
+  add_replacements<Bounds>(tree, bounds, kFewTriangles, build_minimal_tree, replacements);
   sort_by_worth(replacements);
   std::int64_t too_many = static_cast<std::int64_t>(free.size()) - most_blocks;
-  Replaced replaced(tree);
+  Replaced<Bounds> replaced(tree);
   for (const Replacement& replacement : replacements) {
     if (too_many <= 0 && replacement.saving <= 0) break;
     too_many += replacement.more_blocks;
@@ -389,17 +396,18 @@ std::optional<Topology> mostly_free(std::span<const Bounds> bounds, std::int64_t
 }
 
 // The minimal tree with subtrees of all sizes free where that saves most for a block.
-Topology mostly_minimal(std::span<const Bounds> bounds, std::int64_t most_blocks) {
+template <typename Bounds>
+Topology mostly_minimal(const std::vector<Bounds>& bounds, std::int64_t most_blocks) {
   const Topology minimal = build_minimal_tree(bounds);
-  const WorkingTree tree(minimal, bounds);
+  const WorkingTree<Bounds> tree(minimal, bounds);
   std::vector<Replacement> replacements;
   for (std::uint64_t size = kFewTriangles; size / 4 < bounds.size(); size *= 4) {
     const auto most_triangles = static_cast<std::uint32_t>(std::min<std::uint64_t>(size, ~0u));
-    add_replacements(tree, bounds, most_triangles, build_free_tree, replacements);
+    add_replacements<Bounds>(tree, bounds, most_triangles, build_free_tree, replacements);
   }
   sort_by_worth(replacements);
   std::int64_t budget = most_blocks - static_cast<std::int64_t>(minimal.size());
-  Replaced replaced(tree);
+  Replaced<Bounds> replaced(tree);
   for (const Replacement& replacement : replacements) {
     if (replacement.saving <= 0 || replacement.more_blocks > budget || !replaced.is_free(replacement.root))
       continue;
@@ -411,19 +419,29 @@ Topology mostly_minimal(std::span<const Bounds> bounds, std::int64_t most_blocks
 
 }  // namespace
 
-Topology build_minimal_tree(std::span<const Bounds> bounds) {
+template <typename Bounds>
+Topology build_minimal_tree(const std::vector<Bounds>& bounds) {
   const auto n = static_cast<std::uint32_t>(bounds.size());
-  return MinimalTree(bounds).run(n);
+  return MinimalTree<Bounds>(bounds).run(n);
 }
 
-Topology build_free_tree(std::span<const Bounds> bounds) {
-  return Collapse(bounds).run();
+template <typename Bounds>
+Topology build_free_tree(const std::vector<Bounds>& bounds) {
+  return Collapse<Bounds>(bounds).run();
 }
 
-Topology build_mixed_tree(std::span<const Bounds> bounds, double share) {
+template <typename Bounds>
+Topology build_mixed_tree(const std::vector<Bounds>& bounds, double share) {
   const std::int64_t most_blocks = blocks_within(bounds.size(), share);
   if (std::optional<Topology> tree = mostly_free(bounds, most_blocks)) return std::move(*tree);
   return mostly_minimal(bounds, most_blocks);
 }
+
+#define TANDEM_INSTANTIATE(Bounds)                                  \
+  template Topology build_minimal_tree(const std::vector<Bounds>&); \
+  template Topology build_free_tree(const std::vector<Bounds>&);    \
+  template Topology build_mixed_tree(const std::vector<Bounds>&, double);
+TANDEM_FOR_EACH_BOUNDS(TANDEM_INSTANTIATE)
+#undef TANDEM_INSTANTIATE
 
 }  // namespace tandem::build

@@ -81,10 +81,35 @@ void emit_internal_block(const TopologyBlock& from, const Place& place, const Tr
   }
 }
 
-Topology build_topology(std::span<const Bounds> bounds, Imaginary imaginary) {
+template <typename Bounds>
+Topology build_topology(const std::vector<Bounds>& bounds, Imaginary imaginary) {
   if (imaginary == Imaginary::minimal) return build_minimal_tree(bounds);
   if (imaginary == Imaginary::free) return build_free_tree(bounds);
   return build_mixed_tree(bounds, imaginary.share);
+}
+
+template <typename Bounds>
+Topology optimised_topology(const std::vector<Bounds>& bounds, Imaginary imaginary, Effort effort,
+                            OptimisationWatch& watch) {
+  const BuildShares shares = build_shares(effort);
+  watch.reach(0.1 * shares.split);
+  Topology topology = build_topology(bounds, imaginary);
+  watch.reach(shares.split);
+  watch.optimise_between(shares.split, shares.optimised);
+  optimise(topology, bounds, effort, watch);
+  watch.reach(shares.optimised);
+  return topology;
+}
+
+// Samples come in few numbers, each of which is compiled for itself.
+Topology topology_over_samples(const Geometry& geometry, Imaginary imaginary, Effort effort,
+                               OptimisationWatch& watch) {
+  const std::size_t samples = 1 + geometry.poses.size();
+  if (samples == 1) return optimised_topology(normalized_bounds(geometry), imaginary, effort, watch);
+  if (samples <= 4) return optimised_topology(normalized_samples<4>(geometry), imaginary, effort, watch);
+  if (samples <= 8) return optimised_topology(normalized_samples<8>(geometry), imaginary, effort, watch);
+  if (samples <= 16) return optimised_topology(normalized_samples<16>(geometry), imaginary, effort, watch);
+  return optimised_topology(normalized_samples<kMostTreeSamples>(geometry), imaginary, effort, watch);
 }
 
 }  // namespace
@@ -144,15 +169,7 @@ Tree build_tree(const Geometry& geometry, Imaginary imaginary, Effort effort) {
 }
 
 Tree build_tree(const Geometry& geometry, Imaginary imaginary, Effort effort, OptimisationWatch& watch) {
-  const BuildShares shares = build_shares(effort);
-  const std::vector<Bounds> bounds = normalized_bounds(geometry);
-  watch.reach(0.1 * shares.split);
-  Topology topology = build_topology(bounds, imaginary);
-  watch.reach(shares.split);
-  watch.optimise_between(shares.split, shares.optimised);
-  optimise(topology, bounds, effort, watch);
-  watch.reach(shares.optimised);
-  return emit(geometry, topology);
+  return emit(geometry, topology_over_samples(geometry, imaginary, effort, watch));
 }
 
 }  // namespace tandem::build

@@ -19,11 +19,19 @@ struct Tree {
   std::uint32_t depth = 0;
 };
 
+using StoredPoints = std::vector<std::array<float, 3>>;
+
 /// The triangles that a tree is built over: vertex indices into float32 points, relative to the asset's
-/// origin.
+/// origin. Where they move, the tree is made for the mean over the points and all poses.
 struct Geometry {
   std::span<const std::array<float, 3>> points;
   std::span<const std::array<std::uint32_t, 3>> triangles;
+  std::span<const StoredPoints> poses{};  ///< where the points are in other samples of an animation
+
+  /// The triangles in one sample, 0 being that of `points`. Condition: number <= poses.size().
+  Geometry sample(std::size_t number) const {
+    return {number == 0 ? points : std::span<const std::array<float, 3>>(poses[number - 1]), triangles};
+  }
 };
 
 /// The bounds of the corners of all triangles; empty where there is none.

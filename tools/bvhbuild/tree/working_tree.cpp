@@ -5,13 +5,6 @@
 namespace tandem::build {
 namespace {
 
-bool same(const Bounds& a, const Bounds& b) {
-  for (int k = 0; k < 3; ++k) {
-    if (a.lo[k] != b.lo[k] || a.hi[k] != b.hi[k]) return false;
-  }
-  return true;
-}
-
 // Returns all blocks of the topology, parents first.
 std::vector<std::uint32_t> parents_first(const Topology& topology) {
   std::vector<std::uint32_t> order = {0};
@@ -24,9 +17,10 @@ std::vector<std::uint32_t> parents_first(const Topology& topology) {
   return order;
 }
 
+template <typename Bounds>
 class Cutter {
  public:
-  Cutter(const WorkingTree& tree, std::uint32_t most_triangles)
+  Cutter(const WorkingTree<Bounds>& tree, std::uint32_t most_triangles)
       : tree_(tree), most_triangles_(most_triangles), triangles_(tree.size()) {
     count(0);
   }
@@ -40,7 +34,7 @@ class Cutter {
 
  private:
   std::uint32_t count(std::uint32_t block) {
-    const WorkingTree::Block& self = tree_[block];
+    const typename WorkingTree<Bounds>::Block& self = tree_[block];
     std::uint32_t sum = self.is_leaf_block ? self.count : 0;
     for (int i = 0; i < self.count && !self.is_leaf_block; ++i) sum += count(self.child[i]);
     return triangles_[block] = sum;
@@ -78,7 +72,7 @@ class Cutter {
     }
   }
 
-  const WorkingTree& tree_;
+  const WorkingTree<Bounds>& tree_;
   std::uint32_t most_triangles_;
   std::vector<std::uint32_t> triangles_, leaves_;
   std::vector<Region> regions_;
@@ -86,7 +80,8 @@ class Cutter {
 
 }  // namespace
 
-WorkingTree::WorkingTree(const Topology& topology, std::span<const Bounds> triangles)
+template <typename Bounds>
+WorkingTree<Bounds>::WorkingTree(const Topology& topology, std::span<const Bounds> triangles)
     : blocks_(topology.size()), triangles_(triangles), triangle_parent_(triangles.size()) {
   const std::vector<std::uint32_t> order = parents_first(topology);
   for (auto b = order.rbegin(); b != order.rend(); ++b) {
@@ -100,7 +95,8 @@ WorkingTree::WorkingTree(const Topology& topology, std::span<const Bounds> trian
   }
 }
 
-Topology WorkingTree::topology() const {
+template <typename Bounds>
+Topology WorkingTree<Bounds>::topology() const {
   Topology topology(blocks_.size());
   for (std::size_t b = 0; b < blocks_.size(); ++b) {
     topology[b] = {blocks_[b].child, blocks_[b].count, blocks_[b].is_leaf_block};
@@ -108,8 +104,9 @@ Topology WorkingTree::topology() const {
   return topology;
 }
 
-double WorkingTree::cost_change(std::uint32_t block, std::uint32_t out, const Bounds& in,
-                                std::uint32_t top) const {
+template <typename Bounds>
+double WorkingTree<Bounds>::cost_change(std::uint32_t block, std::uint32_t out, const Bounds& in,
+                                        std::uint32_t top) const {
   double change = 0;
   Bounds replaced = in;
   while (block != top) {
@@ -117,7 +114,7 @@ double WorkingTree::cost_change(std::uint32_t block, std::uint32_t out, const Bo
     for (int i = 0; i < self.count; ++i) {
       if (self.child[i] != out) replaced.grow(bounds_of(child(block, i)));
     }
-    if (same(replaced, self.box)) break;  // nothing changes further up
+    if (replaced == self.box) break;  // nothing changes further up
     change += double{replaced.visit_cost()} - double{self.box.visit_cost()};
     out = block;
     block = self.parent;
@@ -125,7 +122,8 @@ double WorkingTree::cost_change(std::uint32_t block, std::uint32_t out, const Bo
   return change;
 }
 
-void WorkingTree::apply(const Exchange& exchange, std::uint32_t top) {
+template <typename Bounds>
+void WorkingTree<Bounds>::apply(const Exchange& exchange, std::uint32_t top) {
   replace(exchange.first_parent, exchange.first.index, exchange.second);
   replace(exchange.second_parent, exchange.second.index, exchange.first);
   refit(exchange.first_parent, top);
@@ -133,7 +131,8 @@ void WorkingTree::apply(const Exchange& exchange, std::uint32_t top) {
 }
 
 // Puts `in` where `out` was; either may be nothing.
-void WorkingTree::replace(std::uint32_t block, std::uint32_t out, Child in) {
+template <typename Bounds>
+void WorkingTree<Bounds>::replace(std::uint32_t block, std::uint32_t out, Child in) {
   Block& self = blocks_[block];
   const auto begin = self.child.begin(), end = begin + self.count;
   const auto place = out == kNoIndex ? end : std::find(begin, end, out);
@@ -147,12 +146,13 @@ void WorkingTree::replace(std::uint32_t block, std::uint32_t out, Child in) {
   (in.is_triangle ? triangle_parent_[in.index] : blocks_[in.index].parent) = block;
 }
 
-void WorkingTree::refit(std::uint32_t block, std::uint32_t top) {
+template <typename Bounds>
+void WorkingTree<Bounds>::refit(std::uint32_t block, std::uint32_t top) {
   while (true) {
     Block& self = blocks_[block];
     const Bounds box = unite(self);
     const std::uint8_t height = height_of(self);
-    if (same(box, self.box) && height == self.height) return;
+    if (box == self.box && height == self.height) return;
     self.box = box;
     self.height = height;
     if (block == top) return;
@@ -160,24 +160,28 @@ void WorkingTree::refit(std::uint32_t block, std::uint32_t top) {
   }
 }
 
-void WorkingTree::refresh_heights(std::uint32_t block) {
+template <typename Bounds>
+void WorkingTree<Bounds>::refresh_heights(std::uint32_t block) {
   for (; block != kNoIndex; block = blocks_[block].parent) blocks_[block].height = height_of(blocks_[block]);
 }
 
-void WorkingTree::restore(std::span<const std::uint32_t> blocks, std::span<const Block> saved) {
+template <typename Bounds>
+void WorkingTree<Bounds>::restore(std::span<const std::uint32_t> blocks, std::span<const Block> saved) {
   for (std::size_t i = 0; i < blocks.size(); ++i) {
     blocks_[blocks[i]] = saved[i];
     adopt(blocks[i]);
   }
 }
 
-Bounds WorkingTree::unite(const Block& block) const {
+template <typename Bounds>
+Bounds WorkingTree<Bounds>::unite(const Block& block) const {
   Bounds box;
   for (int i = 0; i < block.count; ++i) box.grow(bounds_of({block.child[i], block.is_leaf_block}));
   return box;
 }
 
-std::uint8_t WorkingTree::height_of(const Block& block) const {
+template <typename Bounds>
+std::uint8_t WorkingTree<Bounds>::height_of(const Block& block) const {
   std::uint8_t highest = 0;
   for (int i = 0; i < block.count && !block.is_leaf_block; ++i) {
     highest = std::max(highest, blocks_[block.child[i]].height);
@@ -185,23 +189,33 @@ std::uint8_t WorkingTree::height_of(const Block& block) const {
   return static_cast<std::uint8_t>(highest + 1);
 }
 
-void WorkingTree::adopt(std::uint32_t block) {
+template <typename Bounds>
+void WorkingTree<Bounds>::adopt(std::uint32_t block) {
   const Block& self = blocks_[block];
   for (int i = 0; i < self.count; ++i) {
     (self.is_leaf_block ? triangle_parent_[self.child[i]] : blocks_[self.child[i]].parent) = block;
   }
 }
 
-std::vector<Region> cut_into_regions(const WorkingTree& tree, std::uint32_t most_triangles) {
+template <typename Bounds>
+std::vector<Region> cut_into_regions(const WorkingTree<Bounds>& tree, std::uint32_t most_triangles) {
   return Cutter(tree, most_triangles).cut();
 }
 
-double cost_of(const WorkingTree& tree, const Region& region) {
+template <typename Bounds>
+double cost_of(const WorkingTree<Bounds>& tree, const Region& region) {
   double cost = 0;
   for (const std::uint32_t block : region.blocks) {
     if (block != region.root) cost += double{tree[block].box.visit_cost()};
   }
   return cost;
 }
+
+#define TANDEM_INSTANTIATE(Bounds)                                                          \
+  template class WorkingTree<Bounds>;                                                       \
+  template std::vector<Region> cut_into_regions(const WorkingTree<Bounds>&, std::uint32_t); \
+  template double cost_of(const WorkingTree<Bounds>&, const Region&);
+TANDEM_FOR_EACH_BOUNDS(TANDEM_INSTANTIATE)
+#undef TANDEM_INSTANTIATE
 
 }  // namespace tandem::build

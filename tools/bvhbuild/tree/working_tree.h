@@ -22,8 +22,10 @@ struct Exchange {
   std::uint32_t first_parent = 0, second_parent = 0;
 };
 
-/// A tree whose children change places. Whatever is exchanged, the number of blocks, and with it that of
-/// imaginary nodes, stays. Disjoint subtrees may be worked on by different threads.
+/// A tree whose children change places. Bounds: Bounds or SampledBounds, here and below. Whatever is
+/// exchanged, the number of blocks, and with it that of imaginary nodes, stays. Disjoint subtrees may be
+/// worked on by different threads.
+template <typename Bounds>
 class WorkingTree {
  public:
   struct alignas(64) Block {
@@ -88,16 +90,19 @@ struct Region {
 
 /// Cuts a tree into subtrees of at most `most_triangles` triangles, as large as may be, which depends on the
 /// tree alone. The blocks above them, with the subtrees' roots as their children, are the last region.
-std::vector<Region> cut_into_regions(const WorkingTree& tree, std::uint32_t most_triangles);
+template <typename Bounds>
+std::vector<Region> cut_into_regions(const WorkingTree<Bounds>& tree, std::uint32_t most_triangles);
 
 /// The sum of visit_cost() of the region's blocks below its root.
-double cost_of(const WorkingTree& tree, const Region& region);
+template <typename Bounds>
+double cost_of(const WorkingTree<Bounds>& tree, const Region& region);
 
 /// Finds exchanges that make a subtree cheaper. Each thread has its own; they may work on different regions
 /// of one tree.
+template <typename Bounds>
 class ExchangeSearch {
  public:
-  explicit ExchangeSearch(WorkingTree& tree) : tree_(tree), marks_(tree.size()) {}
+  explicit ExchangeSearch(WorkingTree<Bounds>& tree) : tree_(tree), marks_(tree.size()) {}
 
   /// Makes for each child in turn the exchange with another one below the region's root that saves most; ends
   /// early where searches take far longer than they do on ordinary meshes. Result: how many were made.
@@ -124,7 +129,7 @@ class ExchangeSearch {
   bool is_marked(std::uint32_t block) const { return marks_[block].stamp == stamp_; }
   double change_by(const Exchange& exchange, double limit) const;
 
-  WorkingTree& tree_;
+  WorkingTree<Bounds>& tree_;
   std::vector<Mark> marks_;  // of the first parent and the blocks above it
   std::uint32_t stamp_ = 0;
   std::vector<Waiting> waiting_;

@@ -26,6 +26,9 @@ enum class Effort : std::uint8_t {
   best,      ///< then simulated annealing: minutes for 10^5 triangles
 };
 
+/// The most samples of an animation that a tree is made for.
+inline constexpr int kMostTreeSamples = 64;
+
 /// Says what a .bvh file is to hold beside its triangles, and how long, by how many threads, a good tree is
 /// looked for.
 struct BuildOptions {

@@ -11,7 +11,6 @@ FoundPairs Query::find_pairs(const Instances& bodies, bool sorted, double within
   auto options = sized<tandem_gpu_broad_phase_options>();
   options.sorted = sorted;
   options.within = within;
-  options.leave_out_rings = leave_out_rings;
   options.filter = GpuFilter::of(filter, bodies);
   const auto report = BroadPhases::run(broad_phase, [&](tandem_gpu_broad_phase* query) {
     return tandem_gpu_broad_phase_find(query, &bodies.get(), &options, stream);
@@ -48,6 +47,7 @@ nb::tuple Query::contacts(nb::object instances, nb::object given, std::uint32_t 
   options.grouped = grouped;
   options.add_error_bounds = add_error_bounds;
   options.within = within;
+  options.leave_out_rings = leave_out_rings;
   const auto report = ContactQueries::run(contacts, [&](tandem_gpu_contact_query* query) {
     return tandem_gpu_contact_query_find(query, &bodies.get(), &pairs.pairs, &options, stream);
   });

@@ -126,8 +126,8 @@ TEST(SampledTree, SpreadSamplesComeFirst) {
   EXPECT_EQ(spread_first(1, 4), (std::vector<std::size_t>{0}));
 }
 
-/// A book: two leaves that lie on each other at rest, and the pose opens them. Vertices 0 and 1 are the spine,
-/// which the leaves share; 2 and 3 are of one leaf, 4 and 5 of the other; 6 is one more at the spine.
+/// A book: two leaves that lie on each other at rest, and the pose opens them. Vertices 0 and 1 are the
+/// spine, which the leaves share; 2 and 3 are of one leaf, 4 and 5 of the other; 6 is one more at the spine.
 MovingMesh book() {
   return {{{0, 0, 0}, {0, 1, 0}, {1, 0, 0}, {1, 1, 0}, {1, 0, 0}, {1, 1, 0}, {0, 0, 0}},
           {{0, 2, 1}, {2, 3, 1}, {6, 1, 4}, {4, 1, 5}},

@@ -1,6 +1,7 @@
 // Measures bodies that deform on a GPU beside the same ones at rest: deform_speed FILE.bvh [BODIES [SPACING]]
-// All bodies are of the file's mesh, each twisted in its own way; they stand in a square grid along x and y, SPACING of
-// the mesh's width apart (1000 bodies and 0.9 where not given). Prints the median of 100 launches of a graph.
+// All bodies are of the file's mesh, each twisted in its own way; they stand in a square grid along x and y,
+// SPACING of the mesh's width apart (1000 bodies and 0.9 where not given). Prints the median of 100 launches
+// of a graph.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -30,8 +31,8 @@ void expect(cudaError_t error, const char* what) {
   std::exit(1);
 }
 
-/// The positions of the source vertices at rest, in the file's coordinates. Those that no triangle has are at the
-/// origin of the file.
+/// The positions of the source vertices at rest, in the file's coordinates. Those that no triangle has are at
+/// the origin of the file.
 std::vector<float> positions_of(const AssetView& asset) {
   const LevelView level = asset.level();
   std::vector<float> out(3 * asset.header->source_vertices);
@@ -52,10 +53,12 @@ void twist(std::vector<float>& positions, const AssetView& asset, double amount)
   const FileHeader& file = *asset.header;
   const double height = double{file.upper[2]} - double{file.lower[2]};
   double middle[3];
-  for (int k = 0; k < 3; ++k) middle[k] = file.origin[k] + 0.5 * (double{file.upper[k]} + double{file.lower[k]});
+  for (int k = 0; k < 3; ++k)
+    middle[k] = file.origin[k] + 0.5 * (double{file.upper[k]} + double{file.lower[k]});
   for (std::size_t i = 0; i < positions.size(); i += 3) {
     const double angle = amount * (double{positions[i + 2]} - middle[2]) / height, c = std::cos(angle),
-                 s = std::sin(angle), x = double{positions[i]} - middle[0], y = double{positions[i + 1]} - middle[1];
+                 s = std::sin(angle), x = double{positions[i]} - middle[0],
+                 y = double{positions[i + 1]} - middle[1];
     positions[i] = static_cast<float>(middle[0] + c * x - s * y);
     positions[i + 1] = static_cast<float>(middle[1] + s * x + c * y);
   }
@@ -135,7 +138,8 @@ int run(const char* path, std::uint32_t bodies, double spacing) {
     poses[i] = kIdentityPose;
     const std::uint32_t at[2] = {i % side, i / side};
     for (int k = 0; k < 2; ++k)
-      poses[i].translation[k] = spacing * at[k] * (double{view.header->upper[k]} - double{view.header->lower[k]});
+      poses[i].translation[k] =
+          spacing * at[k] * (double{view.header->upper[k]} - double{view.header->lower[k]});
     std::vector<float> own = rest;
     twist(own, view, std::sin(0.7 * i));
     all.insert(all.end(), own.begin(), own.end());
@@ -169,15 +173,19 @@ int run(const char* path, std::uint32_t bodies, double spacing) {
               view.level().triangle_count, view.level().block_count, rest.size() / 3,
               1e-9 * static_cast<double>(deformer.bytes()));
   const double refit_ms = median_of(stream.get(), refit);
-  const double bytes = bodies * (view.level().triangle_count * (48.0 + 12) + view.level().block_count * (128.0 + 112) +
-                                 4.0 * static_cast<double>(rest.size()));
-  std::printf("%-28s %8.3f ms, %.0f GB/s of triangles, blocks and positions\n", "refit", refit_ms, 1e-6 * bytes / refit_ms);
-  bent.print("deformed: pairs, contacts", median_of(stream.get(), [&](cudaStream_t on) { return bent.enqueue(on); }));
+  const double bytes =
+      bodies * (view.level().triangle_count * (48.0 + 12) + view.level().block_count * (128.0 + 112) +
+                4.0 * static_cast<double>(rest.size()));
+  std::printf("%-28s %8.3f ms, %.0f GB/s of triangles, blocks and positions\n", "refit", refit_ms,
+              1e-6 * bytes / refit_ms);
+  bent.print("deformed: pairs, contacts",
+             median_of(stream.get(), [&](cudaStream_t on) { return bent.enqueue(on); }));
   bent.print("refit, pairs, contacts", median_of(stream.get(), [&](cudaStream_t on) {
                const Status status = refit(on);
                return status == Status::kOk ? bent.enqueue(on) : status;
              }));
-  rigid.print("at rest: pairs, contacts", median_of(stream.get(), [&](cudaStream_t on) { return rigid.enqueue(on); }));
+  rigid.print("at rest: pairs, contacts",
+              median_of(stream.get(), [&](cudaStream_t on) { return rigid.enqueue(on); }));
   expect(deformer.report().status, "report");
   expect(bent.query.report().status, "report");
   expect(rigid.query.report().status, "report");
@@ -193,5 +201,6 @@ int main(int count, char** arguments) {
     std::fprintf(stderr, "usage: deform_speed FILE.bvh [BODIES [SPACING]]\n");
     return 2;
   }
-  return tandem::run(arguments[1], static_cast<std::uint32_t>(bodies), count > 3 ? std::atof(arguments[3]) : 0.9);
+  return tandem::run(arguments[1], static_cast<std::uint32_t>(bodies),
+                     count > 3 ? std::atof(arguments[3]) : 0.9);
 }

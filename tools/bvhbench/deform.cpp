@@ -119,8 +119,7 @@ class Rebuilder {
 
   // A file holds float32 numbers: where positions are others, the new trees are refitted to these. Result:
   // nothing where a shape has no triangle left.
-  std::optional<FrameWork> work(const Frame& frame, std::uint32_t number,
-                                std::span<const ObjectPair> pairs) {
+  std::optional<FrameWork> work(const Frame& frame, std::uint32_t number, std::span<const ObjectPair> pairs) {
     FrameWork work;
     bool has_trees = true;
     work.update_seconds = seconds_by(options_.threads, [&] { has_trees = build(frame); });
@@ -137,7 +136,8 @@ class Rebuilder {
 
   // Throws where the contacts are others than those of the refitted trees.
   void compare(const Follower& refitted, std::uint32_t number) const {
-    const std::vector<BodyContact> expected = normalised(refitted, false), found = normalised(follower_, true);
+    const std::vector<BodyContact> expected = normalised(refitted, false),
+                                   found = normalised(follower_, true);
     if (expected == found) return;
     const auto count_missing = [](const auto& some, const auto& all) {
       std::vector<BodyContact> missing;

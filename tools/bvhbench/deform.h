@@ -24,12 +24,13 @@ struct BendingScene {
   std::uint64_t bending_triangles() const;
 };
 
-/// Gives a shape of an engine the positions of a frame of the file at `path`. Result: that of Engine::deform().
-/// Throws FileError where they cannot be taken.
+/// Gives a shape of an engine the positions of a frame of the file at `path`. Result: that of
+/// Engine::deform(). Throws FileError where they cannot be taken.
 std::optional<double> deform(Engine& engine, std::uint32_t shape, const Positions& positions,
                              const std::string& path, std::uint32_t frame);
 
-/// What a peer did of a frame. Seconds are the least of the repeats; a query is asked once before it is timed.
+/// What a peer did of a frame. Seconds are the least of the repeats; a query is asked once before it is
+/// timed.
 struct FrameWork {
   double update_seconds = 0;  ///< until its trees are those of the frame: refitted, or built anew
   double query_seconds = 0;

@@ -172,14 +172,15 @@ ExitCode run_deform(const DeformArguments& arguments) {
   if (frames > bending.frames)
     throw UsageError(arguments.scene + ": has " + std::to_string(bending.frames) + " frames, not " +
                      std::to_string(frames));
-  const DeformOptions options = {frames,           arguments.threads(),  arguments.repeats,
-                                 arguments.rebuild, arguments.self_pairs, arguments.peers};
-  Measured measured = {
-      frames, bending.bending_triangles(),
-      answer_of(arguments.scene, scene, [&] { return measure_frames(bending, options); })};
+  const DeformOptions options = {
+      frames,         arguments.threads(), arguments.repeats, arguments.rebuild, arguments.self_pairs,
+      arguments.peers};
+  Measured measured = {frames, bending.bending_triangles(),
+                       answer_of(arguments.scene, scene, [&] { return measure_frames(bending, options); })};
   for (std::uint32_t frame = 0; frame < frames; ++frame) {
     const auto has_frame = [&](const PeerFrames& peer) { return peer.frames[frame].has_value(); };
-    if (std::all_of(measured.peers.begin(), measured.peers.end(), has_frame)) measured.common.push_back(frame);
+    if (std::all_of(measured.peers.begin(), measured.peers.end(), has_frame))
+      measured.common.push_back(frame);
   }
   if (!arguments.output.empty()) write_csv(arguments, measured);
   print(arguments, report_of(arguments, measured));
@@ -200,22 +201,22 @@ std::string joined(const std::vector<std::string>& words) {
 
 void add_deform(Command tool, Run& run_later) {
   const auto [command, arguments] = add_command<DeformArguments>(
-      tool, run_later, "deform", "refit the trees of bodies that bend, frame by frame, and find their contacts",
-      run_deform);
+      tool, run_later, "deform",
+      "refit the trees of bodies that bend, frame by frame, and find their contacts", run_deform);
   arguments.told_threads = 1;
-  command.add({scene_argument(arguments, "scene file (HDF5) with deformations"),
-               {"--frames", arguments.frames, "N [all]", "how many frames, from the first on",
-                between(1, 4e9)},
-               {"--rebuild", arguments.rebuild,
-                "also trees that are built anew for every frame, whose contacts must be the same"},
-               separated_by_commas({"--peers", arguments.peers, joined(peers_of_tandem()),
-                                    "other engines, on one thread", one_of(peers_of_tandem())}),
-               {"--self", arguments.self_pairs, "also each instance with itself"},
-               {"--threads", arguments.told_threads, "N [1]", "threads; the contacts do not depend on them",
-                between(1, kMostSceneThreads)},
-               repeat_option(arguments, "each frame"),
-               output_option(arguments, "the CSV file to write, a row for each peer and frame"),
-               json_option(arguments, "all of it")});
+  command.add(
+      {scene_argument(arguments, "scene file (HDF5) with deformations"),
+       {"--frames", arguments.frames, "N [all]", "how many frames, from the first on", between(1, 4e9)},
+       {"--rebuild", arguments.rebuild,
+        "also trees that are built anew for every frame, whose contacts must be the same"},
+       separated_by_commas({"--peers", arguments.peers, joined(peers_of_tandem()),
+                            "other engines, on one thread", one_of(peers_of_tandem())}),
+       {"--self", arguments.self_pairs, "also each instance with itself"},
+       {"--threads", arguments.told_threads, "N [1]", "threads; the contacts do not depend on them",
+        between(1, kMostSceneThreads)},
+       repeat_option(arguments, "each frame"),
+       output_option(arguments, "the CSV file to write, a row for each peer and frame"),
+       json_option(arguments, "all of it")});
 }
 
 }  // namespace tandem::bench

@@ -266,7 +266,6 @@ void add_query(Command tool, Run& run_later) {
       tool, run_later, "query", "find every pair of triangles that meet in a scene", run_query);
   command.add({scene_argument(arguments), backend_option(arguments)});
   if (has_cuda()) add_gpu_options(command, arguments);
-<<<<<<< ours
   command.add(
       {{"--mode", arguments.mode, kModes, "exact|fast|boxes [exact]",
         "'exact' contacts, 'fast' ones by float32, or 'boxes': candidates"},
@@ -289,38 +288,12 @@ void add_query(Command tool, Run& run_later) {
        {"--leave-out-rings", arguments.leave_out_rings, "N [0]",
         "of an instance with itself: leave out triangles that share a vertex (1), or that N - 1 edges join",
         between(0, kMostRings)},
-       {"--frame", arguments.frame, "N", "of the scene's deformations; without it nothing bends", between(0, 4e9)},
+       {"--frame", arguments.frame, "N", "of the scene's deformations; without it nothing bends",
+        between(0, 4e9)},
        threads_option(arguments, "the contacts do"),
        repeat_option(arguments),
        output_option(arguments, "the contacts file to write; appears whole or not at all"),
        json_option(arguments)});
-=======
-  command.add({{"--mode", arguments.mode, kModes, "exact|fast|boxes [exact]",
-                "'exact' contacts, 'fast' ones by float32, or 'boxes': candidates"},
-               {"--first-contact", arguments.first_contact, "one contact for each object pair at most"},
-               {"--within", arguments.within, "D [0]",
-                "clearance: also triangles at most so far apart, decided exactly",
-                between(0, kLargestWorldCoordinate)},
-               {"--tolerance", arguments.tolerance, "T",
-                "only which bodies surely meet, which surely do not, and which are within T, by their levels",
-                between(0, kLargestWorldCoordinate)},
-               {"--manifolds", arguments.manifolds, "also contact manifolds: normals, depths and points"},
-               {"--keep", arguments.kept_within, "T",
-                "with --manifolds: also the time for bodies that stand still, whose pairs are kept within T",
-                between(0, kLargestWorldCoordinate)},
-               {"--contained", arguments.contained,
-                "also bodies that lie within others without touching them, found on the CPU"},
-               {"--at", arguments.at, "X Y Z", "also which bodies' world boxes contain this point",
-                between(-kLargestWorldCoordinate, kLargestWorldCoordinate)},
-               {"--self", arguments.self_pairs, "also each instance with itself"},
-               {"--leave-out-rings", arguments.leave_out_rings, "N [0]",
-                "of an instance with itself: leave out what shares a vertex (1), or what N - 1 edges join",
-                between(0, kMostRings)},
-               threads_option(arguments, "the contacts do"),
-               repeat_option(arguments),
-               output_option(arguments, "the contacts file to write; appears whole or not at all"),
-               json_option(arguments)});
->>>>>>> theirs
 }
 
 }  // namespace tandem::bench

@@ -9,8 +9,8 @@
 namespace tandem::bench {
 namespace {
 
-// The effort of a file, and how many imaginary nodes it may have, as its provenance says; else what bvhbuild does
-// without options. The tree is for the CPU, so it gets no oriented blocks.
+// The effort of a file, and how many imaginary nodes it may have, as its provenance says; else what bvhbuild
+// does without options. The tree is for the CPU, so it gets no oriented blocks.
 build::BuildOptions options_of(const AssetView& shape) {
   build::BuildOptions options;
   options.gpu_blocks = false;

@@ -14,8 +14,8 @@ class RebuiltShape {
   /// Condition: level 0 of the shape has source_vertices. The view must stay.
   explicit RebuiltShape(const AssetView& shape);
 
-  /// Builds the tree, by so many threads. Result: false where all triangles are degenerate at these positions,
-  /// which the builder leaves out; there is no tree then.
+  /// Builds the tree, by so many threads. Result: false where all triangles are degenerate at these
+  /// positions, which the builder leaves out; there is no tree then.
   bool build(const Positions& positions, unsigned threads);
 
   /// The shape with its new tree. Conditions: build() returned true. Valid until the next call.

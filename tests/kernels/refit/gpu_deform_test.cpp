@@ -1,4 +1,5 @@
-// Tests bodies that deform on a GPU: their trees have the bytes of the CPU's, and questions the answers of its scenes.
+// Tests bodies that deform on a GPU: their trees have the bytes of the CPU's, and questions the answers of
+// its scenes.
 #include <gtest/gtest.h>
 
 #include <cstring>
@@ -88,10 +89,11 @@ void expect_same_tree(const DeformingAssets& of, std::uint32_t body, const std::
   ASSERT_EQ(tree.begin(rest), Status::kOk);
   ASSERT_EQ(tree.refit(now), Status::kOk);
   expect_same_elements(level.triangles, tree.level().triangles, rest.triangle_count, "triangle");
-  if (level.blocks != nullptr) expect_same_elements(level.blocks, tree.level().blocks, rest.block_count, "block");
+  if (level.blocks != nullptr)
+    expect_same_elements(level.blocks, tree.level().blocks, rest.block_count, "block");
   if (level.oriented_blocks != nullptr)
-    expect_same_elements(level.oriented_blocks, deformed_oriented(rest, tree.level()).data(), rest.block_count,
-                         "oriented block");
+    expect_same_elements(level.oriented_blocks, deformed_oriented(rest, tree.level()).data(),
+                         rest.block_count, "oriented block");
   const GpuAsset record = download(of.list.records().assets + number, 1)[0];
   const AssetBounds bounds = download(of.list.records().bounds + number, 1)[0];
   const TreeExtent extent = extent_of(tree.level().blocks[0]);
@@ -101,7 +103,8 @@ void expect_same_tree(const DeformingAssets& of, std::uint32_t body, const std::
     EXPECT_TRUE(record.lower[k] == lower[k] && record.upper[k] == upper[k]);
     EXPECT_TRUE(bounds.lower[k] == lower[k] && bounds.upper[k] == upper[k]);
     EXPECT_TRUE(record.origin[k] == 0 && bounds.origin[k] == 0);
-    EXPECT_TRUE(record.extent.reach[k] == extent.reach[k] && record.extent.half_extent[k] == extent.half_extent[k] &&
+    EXPECT_TRUE(record.extent.reach[k] == extent.reach[k] &&
+                record.extent.half_extent[k] == extent.half_extent[k] &&
                 record.extent.posed_reach[k] == extent.posed_reach[k]);
   }
   EXPECT_EQ(record.tree.triangles, level.triangles);
@@ -118,7 +121,8 @@ Files refittable(const std::vector<Mesh>& meshes) {
 
 std::vector<Mesh> small_and_large_meshes() {
   std::vector<Mesh> meshes;
-  for (const std::uint32_t count : {1u, 2u, 5u, 17u, 400u, 3000u}) meshes.push_back(random_mesh(count, count));
+  for (const std::uint32_t count : {1u, 2u, 5u, 17u, 400u, 3000u})
+    meshes.push_back(random_mesh(count, count));
   meshes.push_back(cube(0.5f, 60));
   for (Mesh& mesh : meshes) mesh = welded(mesh);
   meshes.push_back(meshes.front());
@@ -160,7 +164,8 @@ TEST_F(GpuDeformerTest, WritesTheBytesOfTheCpuForAnyFiniteCoordinates) {
       do {
         const auto bits = static_cast<std::uint32_t>(random.engine()());
         std::memcpy(&x, &bits, sizeof x);
-        if (step % 3 == 0) x = std::ldexp(1 + static_cast<float>(bits % 8) * 0x1p-23f, static_cast<int>(bits >> 8) % 26);
+        if (step % 3 == 0)
+          x = std::ldexp(1 + static_cast<float>(bits % 8) * 0x1p-23f, static_cast<int>(bits >> 8) % 26);
       } while (!(std::fabs(x) <= kMaxCoordinate));
     }
     ASSERT_EQ(of.deform({now}), Status::kOk);
@@ -263,13 +268,14 @@ struct Crowd {
     }
   }
 
-  std::vector<float> bent_body(std::uint32_t body, RandomPoses& random, std::size_t ways = std::size(kBends)) const {
-    return single(
-        bent(kBends[random.below(ways)], random.symmetric(2), positions_of(meshes[body]), random));
+  std::vector<float> bent_body(std::uint32_t body, RandomPoses& random,
+                               std::size_t ways = std::size(kBends)) const {
+    return single(bent(kBends[random.below(ways)], random.symmetric(2), positions_of(meshes[body]), random));
   }
 };
 
-/// Refit, broad phase and contacts in one graph, whose launches find what the CPU finds at the positions of the time.
+/// Refit, broad phase and contacts in one graph, whose launches find what the CPU finds at the positions of
+/// the time.
 TEST_F(GpuDeformerTest, AGraphIsReplayedWithNewPositionsInPlace) {
   RandomPoses random(25);
   const Crowd crowd(random);
@@ -278,7 +284,8 @@ TEST_F(GpuDeformerTest, AGraphIsReplayedWithNewPositionsInPlace) {
   const std::vector<Instance>& instances = crowd.instances;
   std::vector<std::uint32_t> numbers;
   std::vector<Pose> poses;
-  for (const Instance& instance : instances) numbers.push_back(instance.asset), poses.push_back(instance.pose);
+  for (const Instance& instance : instances)
+    numbers.push_back(instance.asset), poses.push_back(instance.pose);
   const GpuArray<std::uint32_t> asset = on_gpu(numbers);
   const GpuArray<Pose> pose = on_gpu(poses);
   const GpuInstances placed = {asset.data(), pose.data(), static_cast<std::uint32_t>(instances.size())};
@@ -301,8 +308,9 @@ TEST_F(GpuDeformerTest, AGraphIsReplayedWithNewPositionsInPlace) {
     Status status = of.deformer.enqueue(of.places.data(), graph.get());
     if (status == Status::kOk)
       status = broad_phase.enqueue(placed, of.list.records().bounds_of_all(), sorted_pairs, graph.get());
-    return status == Status::kOk ? query.enqueue(placed, broad_phase.pairs(), gpu_options(QueryMode::exact), graph.get())
-                                 : status;
+    return status == Status::kOk
+               ? query.enqueue(placed, broad_phase.pairs(), gpu_options(QueryMode::exact), graph.get())
+               : status;
   });
   std::size_t contacts = 0;
   for (int step = 0; step < trials(20, 10); ++step) {

@@ -16,7 +16,8 @@ using Positions = std::variant<std::vector<float>, std::vector<double>>;
 /// Returns these positions in float32 where nothing is lost by it.
 Positions narrowed(std::vector<double> positions);
 
-/// The deformations of a scene file (docs/scenes.md): where source vertices of its assets are, frame by frame.
+/// The deformations of a scene file (docs/scenes.md): where source vertices of its assets are, frame by
+/// frame.
 class Deformations {
  public:
   /// Opens the file that `scene` was read from. Throws FileError, where it has no deformations, or one that
@@ -28,8 +29,8 @@ class Deformations {
   /// The shapes of the scene that bend: those of assets that have a deformation, ascending.
   std::span<const std::uint32_t> shapes() const { return shapes_; }
 
-  /// Reads the positions of a shape in a frame. Conditions: shape is one of shapes(), frame < frames(). Throws
-  /// FileError.
+  /// Reads the positions of a shape in a frame. Conditions: shape is one of shapes(), frame < frames().
+  /// Throws FileError.
   Positions read(std::uint32_t shape, std::uint32_t frame) const;
 
  private:

@@ -71,14 +71,19 @@ void add_levels(const Options& options, const StoredMesh& mesh, OptimisationWatc
 
 CheckedImage build_file(const Options& options, const StoredMesh& mesh, AssetSource source,
                         const std::function<std::string()>& provenance, OptimisationWatch& watch,
-                        Outcome& outcome) {
+                        Outcome& outcome, const std::vector<std::string>& sample_names) {
   std::vector<BuiltLevel> levels;
   if (!options.levels.empty()) watch.begin_part(0, 0.3);
-  levels.push_back(build_level({mesh.points, mesh.triangles}, options, watch));
+  levels.push_back(build_level({mesh.points, mesh.triangles, mesh.poses}, options, watch));
   levels[0].face = mesh.face;
   if (options.refit) levels[0].source_vertex = mesh.source_vertex;
   if (!options.levels.empty()) add_levels(options, mesh, watch, levels, outcome);
   outcome.interrupted = watch.stop;
+  if (!mesh.poses.empty()) {
+    Stopwatch stopwatch;
+    outcome.samples = measure_samples(levels[0].geometry, levels[0].tree, options, sample_names);
+    outcome.seconds.samples = stopwatch.lap();
+  }
   source.origin = mesh.origin;
   source.rounding_error = mesh.largest_rounding_error;
   source.provenance = provenance();

@@ -36,10 +36,11 @@ void add_levels(const Options& options, const StoredMesh& mesh, OptimisationWatc
 
 /// Builds all levels of a mesh and the file's bytes, and has the checker prove both: what is written, every
 /// program can load. source: parts and number of faces; provenance(): what the file says of its making, asked
-/// once `outcome` tells of the levels.
+/// once `outcome` tells of the levels and samples. sample_names: of the mesh and its poses; needed where it
+/// has poses.
 CheckedImage build_file(const Options& options, const StoredMesh& mesh, AssetSource source,
                         const std::function<std::string()>& provenance, OptimisationWatch& watch,
-                        Outcome& outcome);
+                        Outcome& outcome, const std::vector<std::string>& sample_names = {});
 
 /// Says what the levels of the file are like.
 void describe_levels(const AssetView& asset, Outcome& outcome);

@@ -65,6 +65,13 @@ void add_options(const Tool& tool, Options& options, double& memory_gib, double&
         "coarser levels of the mesh, each proved to be at most so far from the finest: lengths, or with % of "
         "the diagonal of its bounds, ascending; 'auto' is 0.1%,0.3%,1%,3%",
         level_errors_defect},
+       {"--animation", options.animation,
+        "make the tree for the mean over the animations of a glTF file, skins and morph targets included"},
+       {"--samples", options.samples, "N [8]",
+        "samples of the animations that the tree is made for; the rest pose is one of them",
+        between(2, kMostTreeSamples)},
+       {"--poses", options.poses, "FILE...",
+        "make the tree for the mean over MESH and these files, which have the same faces", file_name()},
        {"--strict", options.strict, "take anything dropped or found amiss in the mesh for an error"},
        {"--json", options.json, "print the report as JSON"},
        {"-q,--quiet", options.quiet, "print nothing but errors"},
@@ -80,6 +87,9 @@ void add_options(const Tool& tool, Options& options, double& memory_gib, double&
         "vertices and faces that a scene may have beyond what the bytes of its file can hold: instances "
         "repeat meshes, and counts may promise what is not there",
         between(0, 1e15)}});
+  tool.need("--samples", "--animation");
+  tool.exclude("--poses", "--animation");
+  for (const char* moving : {"--animation", "--poses"}) tool.exclude("--levels", moving);
   tool.end_help(kFooter);
 }
 

@@ -15,6 +15,9 @@ namespace tandem::build {
 struct Options : BuildOptions {
   std::filesystem::path input, output;
   std::vector<LevelError> levels;  ///< the errors of levels beyond the finest
+  bool animation = false;          ///< the tree is made for the file's animations
+  std::uint32_t samples = 8;       ///< of the animations, the rest pose being one
+  std::vector<std::string> poses;  ///< files of the same mesh that the tree is made for too
   ImportOptions import;
   bool strict = false;
   bool json = false;

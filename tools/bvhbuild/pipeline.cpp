@@ -5,12 +5,12 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "bvhbuild/import/import.h"
 #include "bvhbuild/meshing/meshing.h"
 #include "common/json.h"
 #include "common/number_words.h"
 #include "common/output_file.h"
 #include "common/printable.h"
+#include "import_samples.h"
 #include "kernels/common/stopwatch.h"
 #include "level_pipeline.h"
 #include "parallel/parallel.h"
@@ -90,6 +90,17 @@ InputDigest digest_of(const std::filesystem::path& path) {
   return digest;
 }
 
+// Adds what the provenance says of the samples that the tree was made for.
+void add_samples(const Options& options, const Outcome& outcome, Json& json) {
+  if (outcome.samples.empty()) return;
+  json["samples"] = samples_json(outcome.samples);
+  for (std::size_t i = 0; i < outcome.poses.size(); ++i) {
+    json["input"]["poses"].push_back({{"file", fs::path(options.poses[i]).filename().string()},
+                                      {"bytes", outcome.poses[i].bytes},
+                                      {"xxh64", hexadecimal(outcome.poses[i].hash)}});
+  }
+}
+
 /// The provenance section of a file: input, its hash, options that shape the tree, tool, what cleaning met.
 /// Nothing that varies from run to run or with the number of threads, so that the same input gives the same
 /// bytes. Keys in docs/json.md.
@@ -106,18 +117,20 @@ std::string provenance_json(const Options& options, const Outcome& outcome) {
     shaping["levels"] = Json::array();
     for (const LevelError& error : options.levels) shaping["levels"].push_back(name(error));
   }
+  if (options.animation) shaping["animation"] = true;
   if (outcome.interrupted) shaping["interrupted"] = true;
-  const Json json = {{"tool", "bvhbuild"},
-                     {"version", TANDEM_VERSION},
-                     {"input",
-                      {{"file", options.input.filename().string()},
-                       {"bytes", outcome.input.bytes},
-                       {"xxh64", hexadecimal(outcome.input.hash)},
-                       {"reader", outcome.reader},
-                       {"faces", outcome.clean.faces},
-                       {"vertices", outcome.clean.vertices}}},
-                     {"options", shaping},
-                     {"findings", found}};
+  Json json = {{"tool", "bvhbuild"},
+               {"version", TANDEM_VERSION},
+               {"input",
+                {{"file", options.input.filename().string()},
+                 {"bytes", outcome.input.bytes},
+                 {"xxh64", hexadecimal(outcome.input.hash)},
+                 {"reader", outcome.reader},
+                 {"faces", outcome.clean.faces},
+                 {"vertices", outcome.clean.vertices}}},
+               {"options", shaping},
+               {"findings", found}};
+  add_samples(options, outcome, json);
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
@@ -132,7 +145,7 @@ StoredMesh prepare(PolygonMesh& polygons, Outcome& outcome) {
   return mesh;
 }
 
-Image build_image(const Options& options, const PolygonMesh& polygons, const StoredMesh& mesh,
+Image build_image(const Options& options, const SampledImport& imported, const StoredMesh& mesh,
                   Progress& progress, Outcome& outcome) {
   Stopwatch stopwatch;
   OptimisationWatch watch;
@@ -141,9 +154,9 @@ Image build_image(const Options& options, const PolygonMesh& polygons, const Sto
   AssetSource source;
   source.source_faces = outcome.clean.faces;
   source.source_vertices = outcome.clean.vertices;
-  source.parts = polygons.parts;
+  source.parts = imported.read.mesh.parts;
   const auto provenance = [&] { return provenance_json(options, outcome); };
-  auto [image, asset] = build_file(options, mesh, source, provenance, watch, outcome);
+  auto [image, asset] = build_file(options, mesh, source, provenance, watch, outcome, imported.names);
   const FileHeader& header = *asset.header;
   outcome.tree = measure_tree(asset.level(), header.lower, header.upper);
   outcome.gpu_blocks = asset.level().oriented_blocks != nullptr;
@@ -168,16 +181,17 @@ Outcome run_pipeline(const Options& options) {
 
   progress.step("import");
   Stopwatch stopwatch;
-  ImportResult imported = import_mesh(options.input, options.import);
+  SampledImport imported = import_samples(options);
   outcome.input = digest_of(options.input);
   outcome.seconds.import = stopwatch.lap();
-  if (!imported.ok) return fail(outcome, kUnreadableInput, options.input, imported.error);
-  for (const std::string& file : imported.files) {
+  for (const fs::path& pose : imported.pose_files) outcome.poses.push_back(digest_of(pose));
+  if (!imported.read.ok) return fail(outcome, kUnreadableInput, imported.refused, imported.read.error);
+  for (const std::string& file : imported.read.files) {
     std::error_code missing;  // then nothing can be overwritten
     if (fs::equivalent(file, options.output, missing))
       return fail(outcome, kUsage, options.output, "is read too; it would be overwritten");
   }
-  PolygonMesh& polygons = imported.mesh;
+  PolygonMesh& polygons = imported.read.mesh;
   outcome.reader = polygons.reader;
   outcome.single_precision = polygons.single_precision;
   outcome.remarks = polygons.remarks;
@@ -197,7 +211,7 @@ Outcome run_pipeline(const Options& options) {
     return fail(outcome, kUsage, options.input, defect);
 
   progress.step("build");
-  const Image image = build_image(options, polygons, mesh, progress, outcome);
+  const Image image = build_image(options, imported, mesh, progress, outcome);
 
   progress.step("write");
   stopwatch.lap();

@@ -7,6 +7,7 @@
 #include "bvhbuild/levels/ladder.h"
 #include "common/exit_code.h"
 #include "options.h"
+#include "sample_work.h"
 #include "statistics/statistics.h"
 #include "tandem/build/clean_report.h"
 
@@ -56,13 +57,17 @@ struct Outcome {
   std::uint64_t file_bytes = 0;
   std::string hash;  ///< of the output, 16 hexadecimal digits
 
+  std::vector<SampleWork> samples;  ///< of the animation or poses that the tree was made for; empty without
+  std::vector<InputDigest> poses;   ///< of the files of poses
+
   std::vector<LevelOutcome> levels;  ///< of the file where some were asked for, the finest first
   std::vector<LevelLeftOut> levels_left_out;
   std::uint64_t fixed_vertices = 0;  ///< that stay in place at every level: surfaces meet there
 
   struct Seconds {
     double import = 0, clean = 0, build = 0, write = 0;
-    double levels = 0;  ///< of `build`: what the levels beyond the finest took
+    double samples = 0;  ///< of `build`: what measuring the tree in all samples took
+    double levels = 0;   ///< of `build`: what the levels beyond the finest took
   } seconds;
 };
 

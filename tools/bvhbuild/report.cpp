@@ -68,6 +68,7 @@ void add_results(const Outcome& outcome, Report& report) {
                 {"levels_left_out", std::move(left_out)},
                 {"fixed_vertices", outcome.fixed_vertices}});
   }
+  if (!outcome.samples.empty()) report.add("samples", samples_json(outcome.samples));
   report.add("bytes", outcome.file_bytes);
   report.add("hash", outcome.hash);
 }
@@ -116,6 +117,7 @@ void add_level_rows(const Outcome& outcome, Report& report) {
 
 std::string seconds_words(const Options& options, const Outcome::Seconds& s) {
   return format("import %.2f s, clean %.2f s, build %.2f s", s.import, s.clean, s.build) +
+         (s.samples > 0 ? format(" (measuring samples %.2f s)", s.samples) : "") +
          (options.levels.empty() ? "" : format(" (levels %.2f s)", s.levels)) +
          format(", write %.2f s; peak memory %s", s.write, human_bytes(peak_memory_bytes()).c_str());
 }
@@ -137,6 +139,7 @@ void add_text(const Options& options, const Outcome& outcome, Report& report) {
                          " nodes imaginary (minimum " + std::to_string(tree.imaginary_minimum) +
                          format("), depth %u, SAH cost %.2f", tree.depth, tree.sah_cost));
   add_level_rows(outcome, report);
+  if (!outcome.samples.empty()) report.row("samples", samples_words(samples_json(outcome.samples)));
   if (!outcome.gpu_blocks) report.row("note", "no oriented blocks: exact queries on a GPU refuse the file");
   if (!outcome.topology) report.row("note", "no topology: contact manifolds refuse the file");
   if (!outcome.refit) report.row("note", "no source vertices: the tree cannot be refitted to a bent mesh");
@@ -170,6 +173,7 @@ Report report_of(const Options& options, const Outcome& outcome) {
               {"seconds/build", s.build},
               {"seconds/write", s.write}});
   if (!options.levels.empty()) report.add("seconds/levels", s.levels);
+  if (!outcome.samples.empty()) report.add("seconds/samples", s.samples);
   report.add("peak_memory_bytes", peak_memory_bytes());
   return report;
 }

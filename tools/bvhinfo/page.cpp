@@ -142,6 +142,7 @@ void add_source(const Json& source, Report& report) {
     if (interrupted) built += ", interrupted: the best tree until then";
   }
   report.row("built by", built);
+  if (source.contains("samples")) report.row("samples", samples_words(source["samples"]));
 }
 
 std::string faces_of(const Part& part) {

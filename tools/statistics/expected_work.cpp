@@ -129,4 +129,14 @@ ExpectedWork sample_expected_work(const AssetView& asset, std::uint32_t poses) {
   return sum;
 }
 
+std::optional<double> mean_block_pairs(const AssetView& asset, std::span<const Pose> poses) {
+  BudgetedQuery query(asset);
+  double sum = 0;
+  for (const Pose& pose : poses) {
+    sum += static_cast<double>(query.work(pose).block_pairs);
+    if (query.spent()) return std::nullopt;
+  }
+  return sum / static_cast<double>(poses.size());
+}
+
 }  // namespace tandem

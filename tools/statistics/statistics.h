@@ -1,9 +1,11 @@
 #pragma once
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "tandem/formats/view.h"
+#include "tandem/kernels/pose.h"
 
 namespace tandem {
 
@@ -41,6 +43,11 @@ struct ExpectedWork {
 
 /// Samples the first validation poses of seed 1 (near_contact.h). The same mesh always gets the same poses.
 ExpectedWork sample_expected_work(const AssetView& asset, std::uint32_t poses = 64);
+
+/// Returns the mean block pairs of a tree at the identity against itself in each of these poses of its file
+/// coordinates; nothing where they take more than some 20 million, or are too far away for float32 box tests.
+/// Condition: at least one pose.
+std::optional<double> mean_block_pairs(const AssetView& asset, std::span<const Pose> poses);
 
 /// Counts what the topology of a level says.
 struct SurfaceCounts {

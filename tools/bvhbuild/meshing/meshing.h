@@ -31,6 +31,8 @@ struct PolygonMesh {
   std::vector<std::uint32_t> corners;        ///< vertex indices of all faces, one face after the other
   std::vector<std::uint32_t> face_begin{0};  ///< face f has corners [face_begin[f], face_begin[f + 1])
   std::vector<SourcePart> parts;             ///< ascending, without gaps, together all faces
+  /// Where the points are in other samples of an animation: finite and at most kMaxCoordinate in magnitude.
+  std::vector<std::vector<Point>> poses{};
   LeftOut left_out;
   std::string reader;             ///< who read the file, for the report: "tandem PLY", "assimp 5.2.5"
   bool single_precision = false;  ///< the reader keeps only float32 of each coordinate
@@ -70,8 +72,8 @@ TriangleMesh take_triangles(std::span<const Point> points, std::span<const Trian
 
 /// Splits the faces of a file into triangles.
 ///
-/// Effect: takes points, corners and face_begin out of `mesh` (name, parts and remarks stay) and counts in
-/// `report`.
+/// Effect: takes points, poses, corners and face_begin out of `mesh` (name, parts and remarks stay) and
+/// counts in `report`.
 ///
 /// Result: the triangles in the order of the faces. Faces with an index out of range, fewer than three
 /// corners, a coordinate that is not finite or one beyond +-kMaxCoordinate are left out, each counted once,
@@ -81,6 +83,7 @@ TriangleMesh take_triangles(std::span<const Point> points, std::span<const Trian
 /// and the face counted once, and a spike (from a place to another and straight back) becomes a degenerate
 /// triangle: it has no area, and the face is split as if it were not there. What remains of a face without
 /// any area is degenerate too; clean() drops and counts all these. They do not make a face "not simple".
+/// Where there are poses, only corners that lie at the same place in all of them count as such.
 ///
 /// A quad is cut along the diagonal that lies inside, the shorter one if both do. A larger face is projected
 /// along the main axis of its Newell normal (Newell in Sutherland, Sproull & Schumacker 1974) and

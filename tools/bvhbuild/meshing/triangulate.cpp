@@ -92,8 +92,15 @@ class Triangulator {
   }
 
  private:
+  /// Returns whether two vertices lie at the same place, in all poses too.
+  bool same_place(std::uint32_t a, std::uint32_t b) const {
+    return mesh_.points[a] == mesh_.points[b] &&
+           std::all_of(mesh_.poses.begin(), mesh_.poses.end(),
+                       [&](const std::vector<Point>& pose) { return pose[a] == pose[b]; });
+  }
+
   bool repeats_a_corner(Corners corners) const {
-    const auto same = [this](std::uint32_t a, std::uint32_t b) { return mesh_.points[a] == mesh_.points[b]; };
+    const auto same = [this](std::uint32_t a, std::uint32_t b) { return same_place(a, b); };
     return same(corners.front(), corners.back()) ||
            std::adjacent_find(corners.begin(), corners.end(), same) != corners.end();
   }
@@ -112,31 +119,30 @@ class Triangulator {
     for (const std::uint32_t corner : corners) add_corner(face, corner);
     std::size_t first = 0;
     while (points_.size() - first > 2) {
-      if (points_.back() == points_[first]) {
+      if (same_place(vertices_.back(), vertices_[first])) {
         drop_corner();
-      } else if (points_.end()[-2] == points_[first]) {
+      } else if (same_place(vertices_.end()[-2], vertices_[first])) {
         emit(face, {vertices_.end()[-2], vertices_.back(), vertices_[first]});
         drop_corner();
-      } else if (points_.back() == points_[first + 1]) {
+      } else if (same_place(vertices_.back(), vertices_[first + 1])) {
         emit(face, {vertices_.back(), vertices_[first], vertices_[first + 1]});
         ++first;
       } else {
         break;
       }
     }
-    if (points_.size() - first == 2 && points_.back() == points_[first]) drop_corner();
+    if (points_.size() - first == 2 && same_place(vertices_.back(), vertices_[first])) drop_corner();
     points_.erase(points_.begin(), points_.begin() + static_cast<std::ptrdiff_t>(first));
     vertices_.erase(vertices_.begin(), vertices_.begin() + static_cast<std::ptrdiff_t>(first));
   }
 
   void add_corner(std::uint32_t face, std::uint32_t corner) {
-    const Point& place = mesh_.points[corner];
-    if (!points_.empty() && points_.back() == place) return;
-    if (points_.size() > 1 && points_.end()[-2] == place) {
+    if (!points_.empty() && same_place(vertices_.back(), corner)) return;
+    if (points_.size() > 1 && same_place(vertices_.end()[-2], corner)) {
       emit(face, {vertices_.end()[-2], vertices_.back(), corner});
       return drop_corner();
     }
-    points_.push_back(place);
+    points_.push_back(mesh_.points[corner]);
     vertices_.push_back(corner);
   }
 
@@ -210,6 +216,8 @@ TriangleMesh triangulate(PolygonMesh& mesh, CleanReport& report, const SplitPoly
   Triangulator triangulator(mesh, out, report, split);
   for (std::uint32_t face = 0; face < mesh.face_count(); ++face) triangulator.add(face);
   out.points = std::move(mesh.points);
+  out.poses = std::move(mesh.poses);
+  mesh.poses = {};
   mesh.points = {};
   mesh.corners = {};
   mesh.face_begin = {0};

@@ -163,6 +163,20 @@ Tree emit(const Geometry& geometry, const Topology& topology) {
   return tree;
 }
 
+Tree refitted(const Geometry& geometry, const Tree& tree) {
+  Tree out = tree;
+  for (std::size_t b = out.blocks.size(); b-- > 0;) {  // children come after their parents
+    Block& block = out.blocks[b];
+    for (int i = 0; i < kNodesPerBlock && block.kind[i] != NodeKind::imaginary; ++i) {
+      const std::uint32_t below = block.index[i];
+      const Box box = block.kind[i] == NodeKind::leaf ? box_of_triangle(geometry, out.order[below])
+                                                      : enclose(out.blocks[below]);
+      set_node(block, i, box, below, block.kind[i]);
+    }
+  }
+  return out;
+}
+
 Tree build_tree(const Geometry& geometry, Imaginary imaginary, Effort effort) {
   OptimisationWatch watch;
   return build_tree(geometry, imaginary, effort, watch);

@@ -62,6 +62,9 @@ Tree build_tree(const Geometry& geometry, Imaginary imaginary = Imaginary::minim
                 Effort effort = Effort::standard);
 Tree build_tree(const Geometry& geometry, Imaginary imaginary, Effort effort, OptimisationWatch& watch);
 
+/// The same tree over the same triangles where the geometry's points have them: its boxes are made anew.
+Tree refitted(const Geometry& geometry, const Tree& tree);
+
 /// The number of the block that each oriented block belongs to (tandem/formats/oriented_block.h says how they
 /// are numbered).
 std::vector<std::uint32_t> block_order(const Tree& tree);

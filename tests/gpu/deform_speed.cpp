@@ -1,6 +1,7 @@
 // Measures bodies that deform on a GPU beside the same ones at rest: deform_speed FILE.bvh [BODIES [SPACING]]
-// All bodies are of the file's mesh, each twisted in its own way; they stand in a square grid along x and y, SPACING of
-// the mesh's width apart (1000 bodies and 0.9 where not given). Prints the median of 100 launches of a graph.
+// All bodies are of the file's mesh, each twisted in its own way; they stand in a square grid along x and y,
+// SPACING of the mesh's width apart (1000 bodies and 0.9 where not given). Prints the median of 100 launches
+// of a graph.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -30,8 +31,8 @@ void expect(cudaError_t error, const char* what) {
   std::exit(1);
 }
 
-/// The positions of the source vertices at rest, in the file's coordinates. Those that no triangle has are at the
-/// origin of the file.
+/// The positions of the source vertices at rest, in the file's coordinates. Those that no triangle has are at
+/// the origin of the file.
 std::vector<float> positions_of(const AssetView& asset) {
   const LevelView level = asset.level();
   std::vector<float> out(3 * asset.header->source_vertices);
@@ -52,10 +53,12 @@ void twist(std::vector<float>& positions, const AssetView& asset, double amount)
   const FileHeader& file = *asset.header;
   const double height = double{file.upper[2]} - double{file.lower[2]};
   double middle[3];
-  for (int k = 0; k < 3; ++k) middle[k] = file.origin[k] + 0.5 * (double{file.upper[k]} + double{file.lower[k]});
+  for (int k = 0; k < 3; ++k)
+    middle[k] = file.origin[k] + 0.5 * (double{file.upper[k]} + double{file.lower[k]});
   for (std::size_t i = 0; i < positions.size(); i += 3) {
     const double angle = amount * (double{positions[i + 2]} - middle[2]) / height, c = std::cos(angle),
-                 s = std::sin(angle), x = double{positions[i]} - middle[0], y = double{positions[i + 1]} - middle[1];
+                 s = std::sin(angle), x = double{positions[i]} - middle[0],
+                 y = double{positions[i + 1]} - middle[1];
     positions[i] = static_cast<float>(middle[0] + c * x - s * y);
     positions[i + 1] = static_cast<float>(middle[1] + s * x + c * y);
   }
@@ -107,12 +110,46 @@ struct Step {
     return status == Status::kOk ? query.enqueue(instances, broad_phase.pairs(), {}, stream) : status;
   }
   void print(const char* what, double milliseconds) const {
+    expect(broad_phase.report().status, what);
+    expect(query.report().status, what);
+    if (query.report().complete == 0) std::printf("not complete: ");
     std::printf("%-28s %8.3f ms, %llu pairs, %llu contacts, %llu block pairs\n", what, milliseconds,
                 static_cast<unsigned long long>(broad_phase.report().found),
                 static_cast<unsigned long long>(query.report().contacts),
                 static_cast<unsigned long long>(query.report().counters.block_pairs));
   }
 };
+
+/// Measures deformed bodies. positions: of all of them, in GPU memory.
+void measure(std::span<const GpuAsset> assets, std::span<const std::uint32_t> numbers,
+             const GpuInstances& instances, const float* const* positions, LeafFrames frames,
+             cudaStream_t stream) {
+  GpuAssetList list;
+  GpuDeformer deformer;
+  expect(list.set(assets, nullptr), "list");
+  expect(deformer.begin(assets, numbers, list.records(), frames, nullptr), "deformer");
+  expect(deformer.deform(positions, nullptr), "deform");
+  Step bent = {instances, list.records().bounds_of_all(), {}, {}};
+  bent.prepare(assets, list.records().assets);
+  expect(cudaDeviceSynchronize(), "wait");
+  std::printf("leaf blocks in frames of %s, %.2f GB of trees\n",
+              frames == LeafFrames::mesh ? "the mesh" : "rest", 1e-9 * static_cast<double>(deformer.bytes()));
+  const auto refit = [&](cudaStream_t on) { return deformer.enqueue(positions, on); };
+  const LevelView& tree = assets[0].tree;
+  const double bytes =
+      double(numbers.size()) * (tree.triangle_count * (48.0 + 12) + tree.block_count * (128.0 + 112) +
+                                12.0 * static_cast<double>(assets[0].source_vertices));
+  const double refit_ms = median_of(stream, refit);
+  std::printf("%-28s %8.3f ms, %.0f GB/s of triangles, blocks and positions\n", "refit", refit_ms,
+              1e-6 * bytes / refit_ms);
+  bent.print("deformed: pairs, contacts",
+             median_of(stream, [&](cudaStream_t on) { return bent.enqueue(on); }));
+  bent.print("refit, pairs, contacts", median_of(stream, [&](cudaStream_t on) {
+               const Status status = refit(on);
+               return status == Status::kOk ? bent.enqueue(on) : status;
+             }));
+  expect(deformer.report().status, "report");
+}
 
 int run(const char* path, std::uint32_t bodies, double spacing) {
   MappedAsset file;
@@ -135,7 +172,8 @@ int run(const char* path, std::uint32_t bodies, double spacing) {
     poses[i] = kIdentityPose;
     const std::uint32_t at[2] = {i % side, i / side};
     for (int k = 0; k < 2; ++k)
-      poses[i].translation[k] = spacing * at[k] * (double{view.header->upper[k]} - double{view.header->lower[k]});
+      poses[i].translation[k] =
+          spacing * at[k] * (double{view.header->upper[k]} - double{view.header->lower[k]});
     std::vector<float> own = rest;
     twist(own, view, std::sin(0.7 * i));
     all.insert(all.end(), own.begin(), own.end());
@@ -149,39 +187,20 @@ int run(const char* path, std::uint32_t bodies, double spacing) {
   upload(numbers, asset, "instances");
   upload(poses, pose, "poses");
 
-  GpuAssetList list, rigid_list;
-  GpuDeformer deformer;
-  expect(list.set(assets, nullptr), "list");
-  expect(rigid_list.set(assets, nullptr), "list");
-  expect(deformer.begin(assets, numbers, list.records(), nullptr), "deformer");
-  expect(deformer.deform(places_on_gpu.data(), nullptr), "deform");
   const GpuInstances instances = {asset.data(), pose.data(), bodies};
-  Step bent = {instances, list.records().bounds_of_all(), {}, {}};
-  Step rigid = {instances, rigid_list.records().bounds_of_all(), {}, {}};
-  bent.prepare(assets, list.records().assets);
-  rigid.prepare(assets, nullptr);
-
   GpuStream stream;
   expect(stream.create(), "stream");
-  expect(cudaDeviceSynchronize(), "wait");
-  const auto refit = [&](cudaStream_t on) { return deformer.enqueue(places_on_gpu.data(), on); };
-  std::printf("%u bodies of %u triangles, %u blocks, %zu vertices; %.2f GB of trees\n", bodies,
-              view.level().triangle_count, view.level().block_count, rest.size() / 3,
-              1e-9 * static_cast<double>(deformer.bytes()));
-  const double refit_ms = median_of(stream.get(), refit);
-  const double bytes = bodies * (view.level().triangle_count * (48.0 + 12) + view.level().block_count * (128.0 + 112) +
-                                 4.0 * static_cast<double>(rest.size()));
-  std::printf("%-28s %8.3f ms, %.0f GB/s of triangles, blocks and positions\n", "refit", refit_ms, 1e-6 * bytes / refit_ms);
-  bent.print("deformed: pairs, contacts", median_of(stream.get(), [&](cudaStream_t on) { return bent.enqueue(on); }));
-  bent.print("refit, pairs, contacts", median_of(stream.get(), [&](cudaStream_t on) {
-               const Status status = refit(on);
-               return status == Status::kOk ? bent.enqueue(on) : status;
-             }));
-  rigid.print("at rest: pairs, contacts", median_of(stream.get(), [&](cudaStream_t on) { return rigid.enqueue(on); }));
-  expect(deformer.report().status, "report");
-  expect(bent.query.report().status, "report");
-  expect(rigid.query.report().status, "report");
-  return bent.query.report().complete != 0 && rigid.query.report().complete != 0 ? 0 : 1;
+  std::printf("%u bodies of %u triangles, %u blocks, %zu vertices\n", bodies, view.level().triangle_count,
+              view.level().block_count, rest.size() / 3);
+  GpuAssetList list;
+  expect(list.set(assets, nullptr), "list");
+  Step rigid = {instances, list.records().bounds_of_all(), {}, {}};
+  rigid.prepare(assets, nullptr);
+  rigid.print("at rest: pairs, contacts",
+              median_of(stream.get(), [&](cudaStream_t on) { return rigid.enqueue(on); }));
+  for (const LeafFrames frames : {LeafFrames::mesh, LeafFrames::rest})
+    measure(assets, numbers, instances, places_on_gpu.data(), frames, stream.get());
+  return 0;
 }
 
 }  // namespace
@@ -193,5 +212,6 @@ int main(int count, char** arguments) {
     std::fprintf(stderr, "usage: deform_speed FILE.bvh [BODIES [SPACING]]\n");
     return 2;
   }
-  return tandem::run(arguments[1], static_cast<std::uint32_t>(bodies), count > 3 ? std::atof(arguments[3]) : 0.9);
+  return tandem::run(arguments[1], static_cast<std::uint32_t>(bodies),
+                     count > 3 ? std::atof(arguments[3]) : 0.9);
 }

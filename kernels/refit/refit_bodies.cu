@@ -68,24 +68,53 @@ template <bool kFromTriangles>
 struct ClusterMemory {
   static constexpr std::uint32_t kBoxes =
       kFromTriangles ? kMostClusterBlocks : kMostInputs + kMostClusterBlocks;
+  RefitBlock block[kMostClusterBlocks];
+  std::uint16_t height_end[kMaxDepth];
   float corner[kFromTriangles ? kMostInputs : 1][3][3];  ///< of the triangles
   float centre[kBoxes][3], half_extent[kBoxes][3];       ///< of boxes around inputs, and then around blocks
 };
 
-/// Moves the corners of the cluster's triangles: a lane has a corner.
+/// A lane moves so many corners at once, so that it waits for memory once for all of them.
+constexpr std::uint32_t kCornersAtOnce = 4;
+
+/// Moves the corners of the cluster's triangles: a lane has a corner at a time.
 __device__ void move_corners(const DeformingBody& body, const RefitCluster& cluster, const float* positions,
                              ClusterMemory<true>& memory) {
   const CornerSource* const sources = body.corners + std::size_t{3} * cluster.first_input;
   uint4* const to = reinterpret_cast<uint4*>(body.triangles + cluster.first_input);
   float* const corners = &memory.corner[0][0][0];
-#pragma unroll 2
-  for (std::uint32_t i = threadIdx.x; i < 3 * cluster.inputs; i += kThreads) {
-    const CornerSource source = sources[i];
-    const float* const from = positions + std::size_t{3} * source.vertex;
-    const float x = from[0], y = from[1], z = from[2];
-    to[i] = {__float_as_uint(x), __float_as_uint(y), __float_as_uint(z), source.w};
-    corners[3 * i] = x, corners[3 * i + 1] = y, corners[3 * i + 2] = z;
+  const std::uint32_t count = 3 * cluster.inputs;
+  for (std::uint32_t first = threadIdx.x; first < count; first += kCornersAtOnce * kThreads) {
+    CornerSource source[kCornersAtOnce] = {};
+    float p[kCornersAtOnce][3];
+#pragma unroll
+    for (std::uint32_t j = 0; j < kCornersAtOnce; ++j) {
+      if (first + j * kThreads < count) source[j] = sources[first + j * kThreads];
+    }
+#pragma unroll
+    for (std::uint32_t j = 0; j < kCornersAtOnce; ++j) {
+      const float* const from = positions + std::size_t{3} * source[j].vertex;
+      for (int k = 0; k < 3; ++k) p[j][k] = from[k];
+    }
+#pragma unroll
+    for (std::uint32_t j = 0; j < kCornersAtOnce; ++j) {
+      const std::uint32_t i = first + j * kThreads;
+      if (i >= count) break;
+      for (int k = 0; k < 3; ++k) corners[3 * i + static_cast<std::uint32_t>(k)] = p[j][k];
+      to[i] = {__float_as_uint(p[j][0]), __float_as_uint(p[j][1]), __float_as_uint(p[j][2]), source[j].w};
+    }
   }
+}
+
+template <bool kFromTriangles>
+__device__ void take_blocks(const DeformArgs& args, const RefitCluster& cluster,
+                            ClusterMemory<kFromTriangles>& memory) {
+  constexpr std::uint32_t kParts = sizeof(RefitBlock) / sizeof(uint4);
+  const uint4* const from = reinterpret_cast<const uint4*>(args.blocks + cluster.first_block);
+  uint4* const to = reinterpret_cast<uint4*>(memory.block);
+  for (std::uint32_t i = threadIdx.x; i < kParts * cluster.blocks; i += kThreads) to[i] = from[i];
+  for (std::uint32_t i = threadIdx.x; i < cluster.heights; i += kThreads)
+    memory.height_end[i] = args.height_ends[cluster.first_height + i];
 }
 
 __device__ void take_inputs(const DeformArgs& args, const DeformingBody& body, const RefitCluster& cluster,
@@ -108,17 +137,56 @@ __device__ Interval around_triangle(const float (&corner)[3][3], std::uint32_t a
   return enclose(lower, upper);
 }
 
+/// What an oriented block gets: a lane's interval along an axis of the block's frame.
+struct InFrame {
+  Interval own;
+  BlockRotation rotation = {kNoRotation.wx, kNoRotation.yz};
+};
+
+__device__ bool is_no_rotation(const BlockRotation& rotation) {
+  return rotation.wx == kNoRotation.wx && rotation.yz == kNoRotation.yz;
+}
+
+/// The rotation of a leaf block at rest takes no coordinates beyond this one to where float32 ends.
+constexpr double kFarthestInFrame = 0x1p125;
+
+/// box_along() of a triangle's corners, along an axis of the leaf block's frame at rest. own: the interval
+/// along the axis of the mesh, which exact boxes lie along.
+__device__ InFrame in_rest_frame(const BlockLanes& lanes, const float (&corner)[3][3], bool is_real,
+                                 const BlockRotation& rest, const Interval& own) {
+  const ScaledRotation rotation = scaled_rotation(rest);
+  double axis[3], lowest = 0, highest = 0, farthest = 0;
+  for (int i = 0; i < 3; ++i) {
+    const float(&row)[3] = rotation.scaled[i];
+    axis[i] = lanes.axis == 0 ? row[0] : lanes.axis == 1 ? row[1] : row[2];
+  }
+  for (int c = 0; c < 3 && is_real; ++c) {
+    const double x = corner[c][0], y = corner[c][1], z = corner[c][2];
+    const double along = (axis[0] * x + axis[1] * y) + axis[2] * z, apart = fabs(x) + fabs(y) + fabs(z);
+    lowest = c == 0 || along < lowest ? along : lowest;
+    highest = c == 0 || along > highest ? along : highest;
+    farthest = apart > farthest ? apart : farthest;
+  }
+  const double of_block = lanes.joined(farthest, [](double a, double b) { return a < b ? b : a; });
+  if (is_no_rotation(rest) || of_block > kFarthestInFrame) return {own};
+  lowest /= rotation.squared_length;
+  highest /= rotation.squared_length;
+  const float centre = static_cast<float>(0.5 * (lowest + highest));
+  const double half = fmax(highest - centre, centre - lowest) + 0x1p-48 * farthest;
+  return {is_real ? Interval{centre, __double2float_ru(half * (1 + 0x1p-22))} : own, rest};
+}
+
 /// Stores a lane's share of a refitted block.
 __device__ void store(const DeformingBody& body, const RefitBlock& block, const BlockLanes& lanes,
-                      const Interval& own, const Interval& around, float size) {
+                      const Interval& own, const InFrame& in_frame, const Interval& around, float size) {
   if (lanes.column < 3) {
     if (body.blocks != nullptr) {
       body.blocks[block.block].centre[lanes.axis][lanes.node] = own.centre;
       body.blocks[block.block].half_extent[lanes.axis][lanes.node] = own.half_extent;
     }
     if (body.oriented != nullptr) {
-      body.oriented[block.oriented].centre[lanes.axis][lanes.node] = own.centre;
-      body.oriented[block.oriented].half_extent[lanes.axis][lanes.node] = own.half_extent;
+      body.oriented[block.oriented].centre[lanes.axis][lanes.node] = in_frame.own.centre;
+      body.oriented[block.oriented].half_extent[lanes.axis][lanes.node] = in_frame.own.half_extent;
     }
     if (block.root != kNoIndex && lanes.node == 0) {
       body.roots[block.root].centre[lanes.axis] = around.centre;
@@ -127,11 +195,11 @@ __device__ void store(const DeformingBody& body, const RefitBlock& block, const 
   } else if (body.oriented != nullptr && lanes.node == 0) {
     static_assert(offsetof(OrientedBlock, first_below) % sizeof(uint4) == 0);
     *reinterpret_cast<uint4*>(&body.oriented[block.oriented].first_below) = {
-        block.first_below, __float_as_uint(size), kNoRotation.wx, kNoRotation.yz};
+        block.first_below, __float_as_uint(size), in_frame.rotation.wx, in_frame.rotation.yz};
   }
 }
 
-template <bool kFromTriangles>
+template <bool kFromTriangles, LeafFrames kFrames>
 __device__ void refit_block(const DeformingBody& body, const RefitBlock& block, bool is_leaf_block,
                             std::uint32_t box, ClusterMemory<kFromTriangles>& memory) {
   const BlockLanes lanes;
@@ -145,12 +213,17 @@ __device__ void refit_block(const DeformingBody& body, const RefitBlock& block, 
   }
   __syncwarp(lanes.all);
   const Interval around = lanes.box_around(own, is_real);
-  const float size = body.oriented != nullptr ? lanes.size_of(own.half_extent) : 0;
+  InFrame in_frame = {own};
+  if constexpr (kFrames == LeafFrames::rest) {
+    if (is_leaf_block && body.oriented != nullptr)
+      in_frame = in_rest_frame(lanes, memory.corner[is_real ? below : 0], is_real, block.rotation, own);
+  }
+  const float size = body.oriented != nullptr ? lanes.size_of(in_frame.own.half_extent) : 0;
   if (lanes.node == 0 && lanes.column < 3) {
     memory.centre[box][lanes.axis] = around.centre;
     memory.half_extent[box][lanes.axis] = around.half_extent;
   }
-  store(body, block, lanes, own, around, size);
+  store(body, block, lanes, own, in_frame, around, size);
 }
 
 /// Returns whether a body has positions and all are sound. A thread block calls it.
@@ -161,16 +234,17 @@ __device__ bool has_sound_positions(const DeformingBody& body, const float* posi
   return __syncthreads_or(is_bad) == 0;
 }
 
-template <bool kFromTriangles>
+template <bool kFromTriangles, LeafFrames kFrames>
 __global__ void __launch_bounds__(kThreads)
     refit_clusters(const __grid_constant__ DeformArgs args, const RefitWork* work) {
   __shared__ ClusterMemory<kFromTriangles> memory;
   wait_for_kernel_before();
   const RefitWork own = work[blockIdx.x];
   const DeformingBody body = args.bodies[own.body];
-  const float* const positions = args.positions[own.body];
-  if (!has_sound_positions(body, positions)) return;
   const RefitCluster cluster = args.clusters[own.item];
+  const float* const positions = args.positions[own.body];
+  take_blocks(args, cluster, memory);
+  if (!has_sound_positions(body, positions)) return;
   if constexpr (kFromTriangles) {
     move_corners(body, cluster, positions, memory);
   } else {
@@ -180,10 +254,10 @@ __global__ void __launch_bounds__(kThreads)
   std::uint32_t begin = 0;
   for (std::uint32_t height = 0; height < cluster.heights; ++height) {
     __syncthreads();
-    const std::uint32_t end = args.height_ends[cluster.first_height + height];
+    const std::uint32_t end = memory.height_end[height];
     for (std::uint32_t i = begin + threadIdx.x / kLanesPerBlock; i < end; i += kBlocksAtOnce) {
-      refit_block<kFromTriangles>(body, args.blocks[cluster.first_block + i], kFromTriangles && height == 0,
-                                  boxes_before + i, memory);
+      refit_block<kFromTriangles, kFrames>(body, memory.block[i], kFromTriangles && height == 0,
+                                           boxes_before + i, memory);
     }
     begin = end;
   }
@@ -287,11 +361,12 @@ __device__ void write_record(const DeformingBody& body, const PositionCheck& all
 constexpr std::uint32_t kFinishThreads = 1024;
 constexpr Counter kNoneIsBad = ~Counter{0};
 
-/// A lane has a body. The first body whose positions are bad is reported.
+/// A lane has a body. The first body whose positions are bad is reported. No kernel behind this one may be
+/// there before it ends: walks load blocks and triangles by __ldg(), so these must not change while a walk is
+/// there, not even while it waits. So this kernel neither begins early nor lets the next one do so.
 __global__ void __launch_bounds__(kFinishThreads) finish(const __grid_constant__ DeformArgs args) {
   __shared__ Counter first_bad;
   if (threadIdx.x == 0) first_bad = kNoneIsBad;
-  wait_for_kernel_before();
   __syncthreads();
   for (std::uint32_t i = threadIdx.x; i < args.body_count; i += kFinishThreads) {
     if (args.positions[i] == nullptr) continue;
@@ -316,16 +391,16 @@ __global__ void __launch_bounds__(kFinishThreads) finish(const __grid_constant__
 }  // namespace
 
 cudaError_t refit_bodies(const DeformArgs& args, cudaStream_t stream) {
-  const auto grid = [&](std::uint32_t blocks, std::uint32_t threads) {
-    return Grid{blocks, threads, 0, stream, args.limits.early_launch};
-  };
-  cudaError_t error = launch_after(grid(args.work_end[0], kThreads), check_positions, args);
+  const bool early = args.limits.early_launch;
+  cudaError_t error = launch_after({args.work_end[0], kThreads, 0, stream, early}, check_positions, args);
   for (std::uint32_t round = 0; round < args.rounds && error == cudaSuccess; ++round) {
     const std::uint32_t begin = args.work_end[round], count = args.work_end[round + 1] - begin;
-    error = launch_after(grid(count, kThreads), round == 0 ? refit_clusters<true> : refit_clusters<false>,
-                         args, args.work + begin);
+    const auto kernel = round > 0                         ? refit_clusters<false, LeafFrames::mesh>
+                        : args.frames == LeafFrames::rest ? refit_clusters<true, LeafFrames::rest>
+                                                          : refit_clusters<true, LeafFrames::mesh>;
+    error = launch_after({count, kThreads, 0, stream, early}, kernel, args, args.work + begin);
   }
-  return error == cudaSuccess ? launch_after(grid(1, kFinishThreads), finish, args) : error;
+  return error == cudaSuccess ? launch_after({1, kFinishThreads, 0, stream, false}, finish, args) : error;
 }
 
 }  // namespace tandem::gpu

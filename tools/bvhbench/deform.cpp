@@ -42,7 +42,8 @@ class Follower {
  public:
   Follower(const BendingScene& scene, const DeformOptions& options, std::string_view engine)
       : scene_(scene), options_(options), own_(engine == "tandem") {
-    engine_ = make_engine(engine, ContactOptions{.self_pairs = options.self_pairs});
+    engine_ = make_engine(
+        engine, ContactOptions{.self_pairs = options.self_pairs, .leave_out_rings = options.leave_out_rings});
     engine_->set_threads(options.threads);
     engine_->set_filter(scene.filter);
     place(scene.shapes);

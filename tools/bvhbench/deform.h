@@ -50,7 +50,8 @@ struct DeformOptions {
   std::uint32_t threads = 1, repeats = 1;
   bool rebuild = false;  ///< trees that are built anew for each frame are a peer too
   bool self_pairs = false;
-  std::vector<std::string> peers;  ///< names of engines whose shapes can be deformed, beside Tandem's
+  std::uint32_t leave_out_rings = 0;  ///< ContactOptions
+  std::vector<std::string> peers;     ///< names of engines whose shapes can be deformed, beside Tandem's
 };
 
 /// Deforms the bodies frame by frame, and asks each peer for the contacts. The first result is Tandem's; with

@@ -15,6 +15,7 @@ namespace {
 struct DeformArguments : CommonArguments {
   std::optional<std::uint32_t> frames;
   bool rebuild = false, self_pairs = false;
+  std::uint32_t leave_out_rings = 0;
   std::vector<std::string> peers;
 };
 
@@ -116,6 +117,7 @@ Report report_of(const DeformArguments& arguments, const Measured& measured) {
               {"threads", arguments.threads()},
               {"repeats", arguments.repeats},
               {"self_pairs", arguments.self_pairs},
+              {"leave_out_rings", arguments.leave_out_rings},
               {"frames", measured.frames},
               {"common_frames", measured.common.size()},
               {"triangles", measured.triangles}});
@@ -135,13 +137,13 @@ Report report_of(const DeformArguments& arguments, const Measured& measured) {
 // A row for each peer and frame: docs/scenes.md.
 void write_csv(const DeformArguments& arguments, const Measured& measured) {
   std::ostringstream rows;
-  rows << "scene,peer,frame,update_ns,query_ms,contacts,block_pairs,looseness\n";
+  rows << "scene,peer,frame,triangles,update_ns,query_ms,contacts,block_pairs,looseness\n";
   const std::string scene = std::filesystem::path(arguments.scene).stem().string();
   for (const PeerFrames& peer : measured.peers) {
     for (std::size_t i = 0; i < peer.frames.size(); ++i) {
       const std::optional<FrameWork>& work = peer.frames[i];
       if (!work) continue;
-      rows << scene << ',' << peer.name << ',' << i
+      rows << scene << ',' << peer.name << ',' << i << ',' << measured.triangles
            << format(",%.5g,%.5g,", measured.update_nanoseconds(*work), 1e3 * work->query_seconds)
            << work->contacts << ',';
       if (work->block_pairs) rows << *work->block_pairs;
@@ -172,9 +174,13 @@ ExitCode run_deform(const DeformArguments& arguments) {
   if (frames > bending.frames)
     throw UsageError(arguments.scene + ": has " + std::to_string(bending.frames) + " frames, not " +
                      std::to_string(frames));
-  const DeformOptions options = {
-      frames,         arguments.threads(), arguments.repeats, arguments.rebuild, arguments.self_pairs,
-      arguments.peers};
+  const DeformOptions options = {frames,
+                                 arguments.threads(),
+                                 arguments.repeats,
+                                 arguments.rebuild,
+                                 arguments.self_pairs,
+                                 arguments.leave_out_rings,
+                                 arguments.peers};
   Measured measured = {frames, bending.bending_triangles(),
                        answer_of(arguments.scene, scene, [&] { return measure_frames(bending, options); })};
   for (std::uint32_t frame = 0; frame < frames; ++frame) {
@@ -212,6 +218,9 @@ void add_deform(Command tool, Run& run_later) {
        separated_by_commas({"--peers", arguments.peers, joined(peers_of_tandem()),
                             "other engines, on one thread", one_of(peers_of_tandem())}),
        {"--self", arguments.self_pairs, "also each instance with itself"},
+       {"--leave-out-rings", arguments.leave_out_rings, "N [0]",
+        "of an instance with itself: leave out triangles that share a vertex (1), or that N - 1 edges join",
+        between(0, kMostRings)},
        {"--threads", arguments.told_threads, "N [1]", "threads; the contacts do not depend on them",
         between(1, kMostSceneThreads)},
        repeat_option(arguments, "each frame"),

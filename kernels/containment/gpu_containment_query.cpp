@@ -5,7 +5,7 @@
 #include "kernels/common/gpu_host.h"
 #include "kernels/containment/component_labels.h"
 #include "kernels/containment/containment_data.h"
-#include "kernels/refit/follow_records.h"
+#include "kernels/containment/follow_records.h"
 #include "tandem/kernels/detail/buffer.h"
 
 namespace tandem::gpu {

@@ -5,9 +5,9 @@
 
 #include "kernels/common/check_options.h"
 #include "kernels/common/gpu_host.h"
+#include "kernels/manifold/follow_records.h"
 #include "kernels/manifold/manifold_data.h"
 #include "kernels/manifold/shape.h"
-#include "kernels/refit/follow_records.h"
 
 namespace tandem::gpu {
 namespace {

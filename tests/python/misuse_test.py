@@ -165,6 +165,7 @@ FLAGS = [
     ("match_previous", lambda s, value: s.manifolds(match_previous=value)),
     ("gpu_blocks", lambda s, value: tandem.build(BOX_VERTICES, BOX_FACES, gpu_blocks=value)),
     ("topology", lambda s, value: tandem.build(BOX_VERTICES, BOX_FACES, topology=value)),
+    ("refit", lambda s, value: tandem.build(BOX_VERTICES, BOX_FACES, refit=value)),
     ("return_report", lambda s, value: tandem.build(BOX_VERTICES, BOX_FACES, return_report=value)),
 ]
 for name, ask in FLAGS:

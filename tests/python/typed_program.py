@@ -25,7 +25,7 @@ class Box:
 
 def assets(folder: Path) -> list[tandem.Asset]:
     shares: list[float] = []
-    made, report = tandem.build(VERTICES, FACES, effort="best", threads=2, gpu_blocks=True, topology=True, imaginary_share=0.5, face_ids=range(12),
+    made, report = tandem.build(VERTICES, FACES, effort="best", threads=2, gpu_blocks=True, topology=True, refit=True, imaginary_share=0.5, face_ids=range(12),
                                 parts=[("box", "", 12)], provenance="{}", progress=shares.append, return_report=True)
     count: int = report.degenerate
     same: tandem.Asset = tandem.build(Box(), effort="fast")

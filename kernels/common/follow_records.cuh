@@ -5,8 +5,8 @@
 
 #include "tandem/kernels/gpu_arrays.h"
 
-// Questions that keep something of each asset in a form of their own take it anew from the records that they follow, by
-// take_shape(const GpuAsset&, Taken&). Nothing begins early here.
+// Questions that keep something of each asset in a form of their own take it anew from the records that they
+// follow, by take_shape(const GpuAsset&, Taken&). Nothing begins early here.
 namespace tandem::gpu {
 
 inline constexpr std::uint32_t kFollowThreads = 128;
@@ -21,7 +21,8 @@ __global__ void __launch_bounds__(kFollowThreads)
 template <typename Taken>
 cudaError_t take_shapes_of(const GpuAsset* records, std::uint32_t count, Taken* taken, cudaStream_t stream) {
   if (count == 0) return cudaSuccess;
-  take_shapes<<<(count + kFollowThreads - 1) / kFollowThreads, kFollowThreads, 0, stream>>>(records, count, taken);
+  take_shapes<<<(count + kFollowThreads - 1) / kFollowThreads, kFollowThreads, 0, stream>>>(records, count,
+                                                                                            taken);
   return cudaGetLastError();
 }
 

@@ -87,7 +87,7 @@ class GpuDeformer {
 
   /// Queues a call behind what `stream` holds, which may be captured into a graph: it neither waits for the
   /// GPU nor allocates. All bodies take their new shapes by as many kernels as one body of the most triangles
-  /// does: four of up to some 100,000.
+  /// does: four of up to some 60,000.
   ///
   /// positions: in GPU memory, as what they point to: of each body the x, y, z of each source vertex in
   /// float32, in the file's coordinates, as many as FileHeader::source_vertices; null: the body stays as it

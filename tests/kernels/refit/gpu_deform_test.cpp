@@ -342,7 +342,7 @@ TEST_P(GpuDeformerIn, AGraphIsReplayedWithNewPositionsInPlace) {
   ASSERT_EQ(query.set_assets(of.assets, nullptr), Status::kOk);
   ASSERT_EQ(query.follow(of.list.records().assets), Status::kOk);
   const GpuBroadPhaseOptions sorted_pairs = {.sorted = true};
-  ASSERT_EQ(broad_phase.reserve({placed.count, 100}, sorted_pairs), Status::kOk);
+  ASSERT_EQ(broad_phase.reserve({placed.count, 100, placed.count}, sorted_pairs), Status::kOk);
   ASSERT_EQ(query.reserve({100, 100000, 100000}), Status::kOk);
   GraphStream graph;
   graph.capture([&] {

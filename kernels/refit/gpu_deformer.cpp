@@ -60,7 +60,7 @@ struct HostOf<GpuDeformReport> : GpuHost<DeformState, GpuDeformReport> {
   RefitPlans plans;
 
   Status begin(std::span<const GpuAsset> assets, std::span<const std::uint32_t> deforming,
-               const GpuAssetRecords& records, LeafFrames frames, cudaStream_t stream) {
+               const GpuAssetRecords& records, cudaStream_t stream) {
     args = {};
     levels.clear();
     Status status = provide_fixed_memory();
@@ -75,7 +75,6 @@ struct HostOf<GpuDeformReport> : GpuHost<DeformState, GpuDeformReport> {
     if (status == Status::kOk) status = write_records(assets, deforming, records, stream);
     if (status == Status::kOk) {
       args.records = records;
-      args.frames = frames;
       args.body_count = static_cast<std::uint32_t>(deforming.size());
       args.state = state.data();
       args.host_report = report.data();
@@ -281,8 +280,8 @@ GpuDeformer& GpuDeformer::operator=(GpuDeformer&&) noexcept = default;
 GpuDeformer::~GpuDeformer() = default;
 
 Status GpuDeformer::begin(std::span<const GpuAsset> assets, std::span<const std::uint32_t> bodies,
-                          const GpuAssetRecords& records, LeafFrames frames, cudaStream_t stream) {
-  return host_ != nullptr ? host_->begin(assets, bodies, records, frames, stream) : Status::kOutOfMemory;
+                          const GpuAssetRecords& records, cudaStream_t stream) {
+  return host_ != nullptr ? host_->begin(assets, bodies, records, stream) : Status::kOutOfMemory;
 }
 
 Status GpuDeformer::enqueue(const float* const* positions, cudaStream_t stream) {

@@ -137,56 +137,17 @@ __device__ Interval around_triangle(const float (&corner)[3][3], std::uint32_t a
   return enclose(lower, upper);
 }
 
-/// What an oriented block gets: a lane's interval along an axis of the block's frame.
-struct InFrame {
-  Interval own;
-  BlockRotation rotation = {kNoRotation.wx, kNoRotation.yz};
-};
-
-__device__ bool is_no_rotation(const BlockRotation& rotation) {
-  return rotation.wx == kNoRotation.wx && rotation.yz == kNoRotation.yz;
-}
-
-/// The rotation of a leaf block at rest takes no coordinates beyond this one to where float32 ends.
-constexpr double kFarthestInFrame = 0x1p125;
-
-/// box_along() of a triangle's corners, along an axis of the leaf block's frame at rest. own: the interval
-/// along the axis of the mesh, which exact boxes lie along.
-__device__ InFrame in_rest_frame(const BlockLanes& lanes, const float (&corner)[3][3], bool is_real,
-                                 const BlockRotation& rest, const Interval& own) {
-  const ScaledRotation rotation = scaled_rotation(rest);
-  double axis[3], lowest = 0, highest = 0, farthest = 0;
-  for (int i = 0; i < 3; ++i) {
-    const float(&row)[3] = rotation.scaled[i];
-    axis[i] = lanes.axis == 0 ? row[0] : lanes.axis == 1 ? row[1] : row[2];
-  }
-  for (int c = 0; c < 3 && is_real; ++c) {
-    const double x = corner[c][0], y = corner[c][1], z = corner[c][2];
-    const double along = (axis[0] * x + axis[1] * y) + axis[2] * z, apart = fabs(x) + fabs(y) + fabs(z);
-    lowest = c == 0 || along < lowest ? along : lowest;
-    highest = c == 0 || along > highest ? along : highest;
-    farthest = apart > farthest ? apart : farthest;
-  }
-  const double of_block = lanes.joined(farthest, [](double a, double b) { return a < b ? b : a; });
-  if (is_no_rotation(rest) || of_block > kFarthestInFrame) return {own};
-  lowest /= rotation.squared_length;
-  highest /= rotation.squared_length;
-  const float centre = static_cast<float>(0.5 * (lowest + highest));
-  const double half = fmax(highest - centre, centre - lowest) + 0x1p-48 * farthest;
-  return {is_real ? Interval{centre, __double2float_ru(half * (1 + 0x1p-22))} : own, rest};
-}
-
 /// Stores a lane's share of a refitted block.
 __device__ void store(const DeformingBody& body, const RefitBlock& block, const BlockLanes& lanes,
-                      const Interval& own, const InFrame& in_frame, const Interval& around, float size) {
+                      const Interval& own, const Interval& around, float size) {
   if (lanes.column < 3) {
     if (body.blocks != nullptr) {
       body.blocks[block.block].centre[lanes.axis][lanes.node] = own.centre;
       body.blocks[block.block].half_extent[lanes.axis][lanes.node] = own.half_extent;
     }
     if (body.oriented != nullptr) {
-      body.oriented[block.oriented].centre[lanes.axis][lanes.node] = in_frame.own.centre;
-      body.oriented[block.oriented].half_extent[lanes.axis][lanes.node] = in_frame.own.half_extent;
+      body.oriented[block.oriented].centre[lanes.axis][lanes.node] = own.centre;
+      body.oriented[block.oriented].half_extent[lanes.axis][lanes.node] = own.half_extent;
     }
     if (block.root != kNoIndex && lanes.node == 0) {
       body.roots[block.root].centre[lanes.axis] = around.centre;
@@ -195,11 +156,11 @@ __device__ void store(const DeformingBody& body, const RefitBlock& block, const 
   } else if (body.oriented != nullptr && lanes.node == 0) {
     static_assert(offsetof(OrientedBlock, first_below) % sizeof(uint4) == 0);
     *reinterpret_cast<uint4*>(&body.oriented[block.oriented].first_below) = {
-        block.first_below, __float_as_uint(size), in_frame.rotation.wx, in_frame.rotation.yz};
+        block.first_below, __float_as_uint(size), kNoRotation.wx, kNoRotation.yz};
   }
 }
 
-template <bool kFromTriangles, LeafFrames kFrames>
+template <bool kFromTriangles>
 __device__ void refit_block(const DeformingBody& body, const RefitBlock& block, bool is_leaf_block,
                             std::uint32_t box, ClusterMemory<kFromTriangles>& memory) {
   const BlockLanes lanes;
@@ -213,17 +174,12 @@ __device__ void refit_block(const DeformingBody& body, const RefitBlock& block, 
   }
   __syncwarp(lanes.all);
   const Interval around = lanes.box_around(own, is_real);
-  InFrame in_frame = {own};
-  if constexpr (kFrames == LeafFrames::rest) {
-    if (is_leaf_block && body.oriented != nullptr)
-      in_frame = in_rest_frame(lanes, memory.corner[is_real ? below : 0], is_real, block.rotation, own);
-  }
-  const float size = body.oriented != nullptr ? lanes.size_of(in_frame.own.half_extent) : 0;
+  const float size = body.oriented != nullptr ? lanes.size_of(own.half_extent) : 0;
   if (lanes.node == 0 && lanes.column < 3) {
     memory.centre[box][lanes.axis] = around.centre;
     memory.half_extent[box][lanes.axis] = around.half_extent;
   }
-  store(body, block, lanes, own, in_frame, around, size);
+  store(body, block, lanes, own, around, size);
 }
 
 /// Returns whether a body has positions and all are sound. A thread block calls it.
@@ -234,7 +190,7 @@ __device__ bool has_sound_positions(const DeformingBody& body, const float* posi
   return __syncthreads_or(is_bad) == 0;
 }
 
-template <bool kFromTriangles, LeafFrames kFrames>
+template <bool kFromTriangles>
 __global__ void __launch_bounds__(kThreads)
     refit_clusters(const __grid_constant__ DeformArgs args, const RefitWork* work) {
   __shared__ ClusterMemory<kFromTriangles> memory;
@@ -256,8 +212,8 @@ __global__ void __launch_bounds__(kThreads)
     __syncthreads();
     const std::uint32_t end = memory.height_end[height];
     for (std::uint32_t i = begin + threadIdx.x / kLanesPerBlock; i < end; i += kBlocksAtOnce) {
-      refit_block<kFromTriangles, kFrames>(body, memory.block[i], kFromTriangles && height == 0,
-                                           boxes_before + i, memory);
+      refit_block<kFromTriangles>(body, memory.block[i], kFromTriangles && height == 0, boxes_before + i,
+                                  memory);
     }
     begin = end;
   }
@@ -395,10 +351,8 @@ cudaError_t refit_bodies(const DeformArgs& args, cudaStream_t stream) {
   cudaError_t error = launch_after({args.work_end[0], kThreads, 0, stream, early}, check_positions, args);
   for (std::uint32_t round = 0; round < args.rounds && error == cudaSuccess; ++round) {
     const std::uint32_t begin = args.work_end[round], count = args.work_end[round + 1] - begin;
-    const auto kernel = round > 0                         ? refit_clusters<false, LeafFrames::mesh>
-                        : args.frames == LeafFrames::rest ? refit_clusters<true, LeafFrames::rest>
-                                                          : refit_clusters<true, LeafFrames::mesh>;
-    error = launch_after({count, kThreads, 0, stream, early}, kernel, args, args.work + begin);
+    error = launch_after({count, kThreads, 0, stream, early},
+                         round == 0 ? refit_clusters<true> : refit_clusters<false>, args, args.work + begin);
   }
   return error == cudaSuccess ? launch_after({1, kFinishThreads, 0, stream, false}, finish, args) : error;
 }

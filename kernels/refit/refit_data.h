@@ -49,7 +49,6 @@ struct DeformArgs {
   const RefitWork* work;  ///< of the checks, then of each round
   const float* const* positions;
   GpuAssetRecords records;
-  LeafFrames frames;
   std::uint32_t body_count;
   std::uint32_t rounds;
   std::uint32_t work_end[kMostRounds + 1];  ///< of the checks, then of each round

@@ -197,9 +197,7 @@ class PlanMaker {
     std::uint32_t next_input = 0;
     for (const std::uint32_t b : members_.view()) {
       const PlanNode& node = nodes_[b];
-      // The extent of the tree is taken from its root block, along the axes of the mesh.
-      const BlockRotation rotation = b == 0 ? kNoRotation : node.rotation;
-      RefitBlock block = {b, node.oriented, node.first_below, node.root, {}, rotation};
+      RefitBlock block = {b, node.oriented, node.first_below, node.root, {}, node.rotation};
       std::fill_n(block.below, kNodesPerBlock, RefitBlock::kNothing);
       for (int i = 0; i < node.count; ++i) {
         std::uint32_t below = next_input;

@@ -34,7 +34,7 @@ struct alignas(16) RefitBlock {
   /// What is below each node: a triangle of the cluster, or a box of the cluster; boxes are numbered inputs
   /// first, then blocks. kNothing: the node is imaginary.
   std::uint16_t below[kNodesPerBlock];
-  BlockRotation rotation;  ///< of the oriented block at rest; kNoRotation of the root block
+  BlockRotation rotation;  ///< of the oriented block at rest
 };
 static_assert(sizeof(RefitBlock) == 32);
 

@@ -232,8 +232,8 @@ class Gpu final : public SceneDevice {
     if (deforming_[asset] != nullptr) return Status::kOk;
     std::unique_ptr<DeformingAsset> made(new (std::nothrow) DeformingAsset);
     if (made == nullptr) return Status::kOutOfMemory;
-    const Status status = made->deformer.begin(assets_.view(), std::span(&asset, 1), list_.records(),
-                                               LeafFrames::mesh, kStream);
+    const Status status =
+        made->deformer.begin(assets_.view(), std::span(&asset, 1), list_.records(), kStream);
     if (status == Status::kOk) deforming_[asset] = std::move(made);
     return status;
   }

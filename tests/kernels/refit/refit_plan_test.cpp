@@ -128,7 +128,7 @@ struct PlannedRefit {
     }
     EXPECT_EQ(rest.block_order[own.oriented], own.block);
     EXPECT_EQ(rest.oriented_blocks[own.oriented].first_below, own.first_below);
-    EXPECT_EQ(own.block == 0 ? kNoRotation : rest.oriented_blocks[own.oriented].rotation, own.rotation);
+    EXPECT_EQ(rest.oriented_blocks[own.oriented].rotation, own.rotation);
   }
 };
 
@@ -166,7 +166,7 @@ TEST(RefitPlan, RefitsEveryTreeAsTheCpuDoes) {
     files.push_back(std::make_unique<Bytes>(make_refittable_file(welded(mesh))));
   };
   for (const std::uint32_t count : {1u, 2u, 5u, 17u, 400u, 600u, 3000u}) add(random_mesh(count, count));
-  add(cube(0.5f, 110));
+  add(cube(0.5f, 60));
   expect_right_plans(files, 3);
 }
 

@@ -42,13 +42,6 @@ class GpuAssetList {
   GpuAssetRecords records_ = {};
 };
 
-/// Says along which axes the boxes of those oriented blocks of a deformed tree lie that have triangles below
-/// them; all others lie along the axes of the mesh.
-enum class LeafFrames : std::uint8_t {
-  mesh,  ///< those of the mesh, too
-  rest,  ///< their own, as in the file: boxes fit better where triangles have hardly turned
-};
-
 /// The outcome of a call.
 struct GpuDeformReport {
   Status status;  ///< kOk, or kOutOfRange
@@ -60,8 +53,8 @@ struct GpuDeformReport {
 /// Deforms bodies on the GPU: it owns a copy of the tree of each, and gives that the positions of the body's
 /// source vertices, which lie in GPU memory. Records of assets name these copies, so queries that follow()
 /// the records, and a broad phase that is given their bounds, are about the deformed bodies. Boxes are those
-/// of Scene::deform(), and oriented blocks have the same, along the axes of the mesh, but where LeafFrames
-/// says otherwise. The same positions give the same bytes.
+/// of Scene::deform(), and oriented blocks have the same along the axes of the mesh. The same positions give
+/// the same bytes.
 ///
 /// Throws nothing. Movable, not copyable. Several deformers may write to the records of one list, each its
 /// own.
@@ -83,7 +76,7 @@ class GpuDeformer {
   /// 1 blocks or thread blocks in all); kOutOfMemory, kOutOfGpuMemory, or another that status_of() of
   /// gpu_status.h names. After an error no body deforms.
   Status begin(std::span<const GpuAsset> assets, std::span<const std::uint32_t> bodies,
-               const GpuAssetRecords& records, LeafFrames frames, cudaStream_t stream);
+               const GpuAssetRecords& records, cudaStream_t stream);
 
   /// Queues a call behind what `stream` holds, which may be captured into a graph: it neither waits for the
   /// GPU nor allocates. All bodies take their new shapes by as many kernels as one body of the most triangles

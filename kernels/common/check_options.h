@@ -3,7 +3,6 @@
 #include <cstdint>
 
 #include "tandem/formats/status.h"
-#include "tandem/kernels/contact_query.h"
 #include "tandem/kernels/detail/interval.h"
 #include "tandem/kernels/manifold.h"
 #include "tandem/kernels/world_box.h"
@@ -19,12 +18,6 @@ inline Status check_reach(double reach) {
 /// A distance within which triangles count as contacts. Result: kOk or kBadReach.
 inline Status check_within(double within) {
   return within >= 0 && within <= kLargestWorldCoordinate ? Status::kOk : Status::kBadReach;
-}
-
-/// Result: kOk, kBadReach or kBadOption.
-inline Status check_contact_options(double within, std::uint32_t leave_out_rings) {
-  if (const Status status = check_within(within); status != Status::kOk) return status;
-  return leave_out_rings <= kMostRings ? Status::kOk : Status::kBadOption;
 }
 
 /// Result: kOk, kBadTolerance or kBadReach.

@@ -96,6 +96,7 @@ struct GpuHost : Memory {
 /// The list of assets as kernels take it.
 struct AssetList {
   RoomArray<GpuAsset> list;
+  const GpuAsset* records = nullptr;  // to follow, instead of the list
   AssetSummary all = {};
   std::uint32_t count = 0;
 
@@ -105,6 +106,7 @@ struct AssetList {
   template <typename Host>
   Status set(std::span<const GpuAsset> assets, const AssetSummary& summary, Host& host, cudaStream_t stream) {
     count = 0;
+    records = nullptr;
     if (assets.size() >= kNoIndex) return Status::kOutOfRange;
     Status status = host.keep(list.upload(assets, stream));
     if (status == Status::kOk) status = host.keep(cudaStreamSynchronize(stream));
@@ -116,7 +118,7 @@ struct AssetList {
 
   template <typename Args>
   void fill(Args& args) const {
-    args.assets = list.data();
+    args.assets = records != nullptr ? records : list.data();
     args.asset_count = count;
   }
 };
@@ -196,6 +198,11 @@ template <typename Capacity, typename Report, typename Options>
 Status GpuAssetQuestion<Capacity, Report, Options>::set_assets(std::span<const GpuAsset> assets,
                                                                cudaStream_t stream) {
   return this->host_ != nullptr ? this->host_->set_assets(assets, stream) : Status::kOutOfMemory;
+}
+
+template <typename Capacity, typename Report, typename Options>
+Status GpuAssetQuestion<Capacity, Report, Options>::follow(const GpuAsset* records) {
+  return this->host_ != nullptr ? this->host_->follow(records) : Status::kOutOfMemory;
 }
 
 }  // namespace tandem

@@ -43,7 +43,7 @@ static_assert(sizeof(PairRecord) == 160);
 enum class BlockKind : std::uint8_t { axis_aligned, oriented };
 
 /// Says what an error is about, in the order of the CPU's checks.
-enum class Subject : Counter { instance, pair, reach };
+enum class Subject : Counter { instance, pair, reach, topology };
 
 /// An error as one number, of which the largest wins: that of the first subject, and of those the first.
 __host__ __device__ constexpr Counter packed_error(Subject subject, Counter where, Status status) {

@@ -175,7 +175,8 @@ struct ContactQuery::State : Allocated {
 Status ContactQuery::answer(SceneState& scene, const std::span<const ObjectPair>* given,
                             const ContactOptions& options) {
   const std::uint32_t rings = options.leave_out_rings;
-  Status status = check_contact_options(options.within, rings);
+  Status status = check_within(options.within);
+  if (status == Status::kOk) status = check_rings(rings);
   if (status != Status::kOk) return scene.fail(status, 0);
   status = scene.take_or_find_pairs(given, options.within, options.self_pairs, pairs_);
   if (status == Status::kOk && rings > 0) status = require_topology_of_selves(scene, pairs_.view());

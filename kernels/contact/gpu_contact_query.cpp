@@ -4,6 +4,7 @@
 
 #include "kernels/common/check_options.h"
 #include "kernels/common/gpu_host.h"
+#include "kernels/contact/gpu_neighbours.h"
 #include "kernels/contact/gpu_query_data.h"
 #include "kernels/contact/only_walk.h"
 
@@ -31,6 +32,7 @@ std::uint64_t sums_of_tiles(std::uint64_t pairs) {
 template <>
 struct HostOf<GpuContactReport> : GpuHost<QueryState, GpuContactReport> {
   AssetList assets{*this};
+  GpuNeighbours neighbours{*this};
   bool state_is_clear = false;  // a query that ends leaves it so
   bool walks_only = false;
   ArgArray<&QueryArgs::chunks> chunks{*this};
@@ -78,7 +80,14 @@ struct HostOf<GpuContactReport> : GpuHost<QueryState, GpuContactReport> {
       state_is_clear = made == Status::kOk;
       return made;
     });
-    return status == Status::kOk ? assets.set(given, all, *this, stream) : status;
+    if (status != Status::kOk) return status;
+    const Status known = neighbours.set_assets(given);
+    return known == Status::kOk ? assets.set(given, all, *this, stream) : known;
+  }
+
+  Status follow(const GpuAsset* of_list) {
+    assets.records = of_list;
+    return Status::kOk;
   }
 
   Status reserve(const GpuContactCapacity& wanted, const GpuContactOptions& options) {
@@ -87,6 +96,9 @@ struct HostOf<GpuContactReport> : GpuHost<QueryState, GpuContactReport> {
     if (status == Status::kOk) status = keep(of_contacts.grow(wanted.contacts));
     if (status == Status::kOk) status = keep(of_undecided.grow(wanted.undecided, kMostUndecided));
     if (status == Status::kOk && options.of_clearance()) status = reserve_clearance();
+    if (status == Status::kOk && options.leave_out_rings <= kMostRings)
+      status =
+          neighbours.provide(options.leave_out_rings, [this](cudaError_t result) { return keep(result); });
     if (status == Status::kOk && options.sorted) status = reserve_sorting();
     return status == Status::kOk && options.grouped ? reserve_grouping() : status;
   }
@@ -137,11 +149,12 @@ struct HostOf<GpuContactReport> : GpuHost<QueryState, GpuContactReport> {
   // Returns why a query with these options cannot be queued.
   Status refusal(const GpuContactOptions& options) const {
     if (const Status status = check_within(options.within); status != Status::kOk) return status;
+    if (const Status status = check_rings(options.leave_out_rings); status != Status::kOk) return status;
     const bool oriented = walked_kind(options.mode) == BlockKind::oriented;
     if (oriented && !assets.all.oriented) return Status::kNoOrientedBlocks;
     if (!oriented && !assets.all.axis_aligned) return Status::kNoAxisAlignedBlocks;
     const bool has_room = (!options.sorted || can_sort()) && (!options.grouped || can_group()) &&
-                          (!options.of_clearance() || can_clear());
+                          (!options.of_clearance() || can_clear()) && neighbours.has(options.leave_out_rings);
     return has_room ? Status::kOk : Status::kOutOfRange;
   }
 
@@ -160,6 +173,7 @@ struct HostOf<GpuContactReport> : GpuHost<QueryState, GpuContactReport> {
     args.within = options.within;
     args.adds_errors = options.add_error_bounds;
     args.near = options.of_clearance();
+    if (options.leave_out_rings == 0) args.neighbourhoods = nullptr;
     return args;
   }
 

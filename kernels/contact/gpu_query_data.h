@@ -6,6 +6,7 @@
 #include "kernels/common/launch.h"
 #include "kernels/common/pair_record.h"
 #include "kernels/contact/candidate.h"
+#include "kernels/contact/neighbours.h"
 #include "kernels/contact/walk_shape.h"
 #include "kernels/geometry/clearance.h"
 #include "kernels/geometry/level_error.h"
@@ -108,6 +109,7 @@ struct QueryArgs {
   bool near;                             ///< a query of clearance: one of these is not 0
   distance::FrameClearance* clearances;  ///< of each pair that is in_frame; of clearance, as the next
   WideRoom* wide_rooms;
+  Neighbourhood* neighbourhoods;  ///< of the assets; null: no neighbours are left out
 };
 
 /// The room that sorting takes besides args.contacts, which it reads: each array is of as many contacts.

@@ -6,6 +6,7 @@
 #include "kernels/contact/neighbours.h"
 #include "tandem/formats/status.h"
 #include "tandem/formats/view.h"
+#include "tandem/kernels/contact_query.h"
 #include "tandem/kernels/detail/buffer.h"
 #include "tandem/kernels/object_pair.h"
 
@@ -13,6 +14,11 @@
 namespace tandem {
 
 struct SceneState;
+
+/// The rings that contacts leave out. Result: kOk or kBadOption.
+inline Status check_rings(std::uint32_t leave_out_rings) {
+  return leave_out_rings <= kMostRings ? Status::kOk : Status::kBadOption;
+}
 
 /// Owns the neighbourhoods of meshes for one number of rings. Levels with one topology are one mesh.
 class NeighbourLists {

@@ -23,10 +23,11 @@ struct Neighbourhood {
 namespace {
 
 TANDEM_HD inline bool share_vertex(const TriangleTopology& x, const TriangleTopology& y) {
-  const auto is_of_y = [&](std::uint32_t u) {
-    return (u == y.vertex[0]) | (u == y.vertex[1]) | (u == y.vertex[2]);
-  };
-  return is_of_y(x.vertex[0]) | is_of_y(x.vertex[1]) | is_of_y(x.vertex[2]);
+  bool shared = false;
+  for (const std::uint32_t u : x.vertex) {
+    for (const std::uint32_t v : y.vertex) shared |= u == v;
+  }
+  return shared;
 }
 
 /// Returns whether a path of at most n - 1 edges joins two different vertices. Condition: n > 1.
@@ -66,8 +67,8 @@ TANDEM_HD inline std::uint32_t drop_neighbours(const Neighbourhood& mesh, std::u
 #endif
   for (; hits != 0; hits &= hits - 1) {
     const auto bit = static_cast<std::uint32_t>(lowest_bit(hits));
-    if (are_neighbours(mesh, mesh.topology[first_a + bit / 4], mesh.topology[first_b + bit % 4]))
-      left &= ~(1u << bit);
+    const TriangleTopology x = mesh.topology[first_a + bit / 4], y = mesh.topology[first_b + bit % 4];
+    if (are_neighbours(mesh, x, y)) left &= ~(1u << bit);
   }
   return left;
 }

@@ -21,6 +21,9 @@ __device__ void prepare_pair(const QueryArgs& args, std::uint32_t index) {
     return report_error(args, Subject::pair, index, status);
   if (args.instances.asset[pair.a] >= args.asset_count || args.instances.asset[pair.b] >= args.asset_count)
     return;  // reported with the instance
+  const std::uint32_t asset = args.instances.asset[pair.a];
+  if (args.neighbourhoods != nullptr && pair.a == pair.b && args.assets[asset].tree.topology == nullptr)
+    return report_error(args, Subject::topology, asset, Status::kNoTopology);
   distance::FrameClearance clearance;
   const PairRecord record = make_record(args.instances, args.assets, pair, walked_kind(args.mode),
                                         kNear ? clearance_of(args, pair.a, pair.b) : 0, clearance);

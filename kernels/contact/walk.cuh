@@ -176,6 +176,11 @@ class Walk {
       if (leaf_a != leaf_b && hits != 0 && worth_planes(leaf_a, side_a.size, side_b.size))
         hits = Means::drop_beyond_planes(record, now.a, now.b, hits);
     }
+    if constexpr (Means::kMayLeaveOut) {
+      if (leaf_a && leaf_b && (taken.entry.z & kSelf) != 0 && args_.neighbourhoods != nullptr)
+        hits = without_neighbours(args_, record, side_a.below & ~OrientedBlock::kIsLeafBlock,
+                                  side_b.below & ~OrientedBlock::kIsLeafBlock, hits);
+    }
     if (leaf_a && leaf_b) return {entry_of(taken, hits, Descent::both, now, side_a, side_b), true};
     const Descent goes_on = leaf_a != leaf_b
                                 ? descent_beside_leaves(leaf_a)
@@ -341,8 +346,14 @@ inline cudaError_t launch_shaped(void (*kernel)(QueryArgs), const QueryArgs& arg
 }
 
 template <class Means>
-cudaError_t launch_walk(const QueryArgs& args, cudaStream_t stream) {
+cudaError_t launch_walk_of(const QueryArgs& args, cudaStream_t stream) {
   return launch_shaped(args.shape.shares ? walk<Means, true> : walk<Means, false>, args, stream);
+}
+
+template <class Means>
+cudaError_t launch_walk(const QueryArgs& args, cudaStream_t stream) {
+  return args.neighbourhoods != nullptr ? launch_walk_of<LeavingOut<Means>>(args, stream)
+                                        : launch_walk_of<Means>(args, stream);
 }
 
 }  // namespace

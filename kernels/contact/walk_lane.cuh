@@ -201,6 +201,15 @@ __device__ inline Triangle load_triangle(const Triangle* triangles, std::uint32_
   return out;
 }
 
+/// Drops the neighbours among the hits of two leaf blocks of an instance that meets itself. first_a, first_b:
+/// their first triangles. Condition: args.neighbourhoods is not null.
+__device__ __noinline__ std::uint32_t without_neighbours(const QueryArgs& args, const PairRecord& record,
+                                                         std::uint32_t first_a, std::uint32_t first_b,
+                                                         std::uint32_t hits) {
+  const Neighbourhood& mesh = args.neighbourhoods[args.instances.asset[record.instance_a]];
+  return drop_neighbours(mesh, first_a, first_b, hits);
+}
+
 /// The state of a candidate in a lane.
 struct Judged {
   std::uint32_t face_a, face_b;
@@ -212,6 +221,7 @@ template <QueryMode kMode, bool kWalksOnly = false>
 struct InFrame {
   static constexpr bool kWorld = false;
   static constexpr bool kCountsOnly = kWalksOnly;  ///< candidates are counted, none decided
+  static constexpr bool kMayLeaveOut = false;      ///< neighbours, where args.neighbourhoods has them
   static constexpr bool kBounded = kMode == QueryMode::exact;
   using Blocks = WalkedBlocks<kMode>;
 
@@ -270,6 +280,12 @@ struct NearInFrame : InFrame<kMode> {
   }
 };
 
+/// Leaves out neighbours. Walks without it are compiled without this question.
+template <class Means>
+struct LeavingOut : Means {
+  static constexpr bool kMayLeaveOut = true;
+};
+
 /// Triangles of a candidate, in world coordinates.
 __device__ inline TrianglePair posed_pair(const QueryArgs& args, const PairRecord& record, std::uint32_t a,
                                           std::uint32_t b) {
@@ -324,6 +340,7 @@ template <QueryMode kMode, bool kWalksOnly, bool kNear>
 struct InWorld {
   static constexpr bool kWorld = true;
   static constexpr bool kCountsOnly = kWalksOnly;
+  static constexpr bool kMayLeaveOut = true;
   using Blocks = WalkedBlocks<kMode>;
 
   __device__ static std::uint32_t test(const QueryArgs& args, const PairRecord& record, std::uint32_t a,

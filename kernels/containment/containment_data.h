@@ -8,6 +8,23 @@
 #include "kernels/geometry/inside_test.h"
 #include "tandem/kernels/gpu_containment_query.h"
 
+namespace tandem::containment {
+
+/// Gives a surface the shape of an asset.
+TANDEM_HD inline void take_shape(const GpuAsset& asset, Surface& surface) {
+  surface.triangles = asset.tree.triangles;
+  surface.blocks = asset.tree.blocks;
+  surface.oriented_blocks = asset.tree.oriented_blocks;
+  for (int k = 0; k < 3; ++k) {
+    surface.origin[k] = asset.origin[k];
+    surface.lower[k] = asset.lower[k];
+    surface.upper[k] = asset.upper[k];
+  }
+  surface.farthest = farthest_of(asset.extent);
+}
+
+}  // namespace tandem::containment
+
 // The kernels that find bodies within bodies share this data, all of it in GPU memory.
 namespace tandem::gpu {
 

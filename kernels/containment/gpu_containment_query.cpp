@@ -5,6 +5,7 @@
 #include "kernels/common/gpu_host.h"
 #include "kernels/containment/component_labels.h"
 #include "kernels/containment/containment_data.h"
+#include "kernels/containment/follow_records.h"
 #include "tandem/kernels/detail/buffer.h"
 
 namespace tandem::gpu {
@@ -15,6 +16,8 @@ template <>
 struct HostOf<GpuContainmentReport> : GpuHost<ContainmentState, GpuContainmentReport> {
   ArgArray<&ContainmentArgs::surfaces> surfaces{*this};
   RoomArray<std::uint32_t> labels{*this};
+  std::uint32_t asset_count = 0;
+  const GpuAsset* records = nullptr;  // to follow
 
   Room<std::uint32_t> of_pairs{*this};
   ArgArray<&ContainmentArgs::rows_of_pair> rows_of_pair{of_pairs};
@@ -34,17 +37,11 @@ struct HostOf<GpuContainmentReport> : GpuHost<ContainmentState, GpuContainmentRe
   Status make_surface(const GpuAsset& asset, std::uint32_t* labels_of_it, cudaStream_t stream, Surface& out) {
     LevelView level = asset.tree;
     out = {};
-    out.triangles = level.triangles;
-    out.blocks = level.blocks;
-    out.oriented_blocks = level.oriented_blocks;
+    take_shape(asset, out);
     out.components = level.components;
     out.triangle_count = level.triangle_count;
     out.component_count = level.component_count;
     out.closed = out.any_closed = level.closed;
-    std::copy_n(asset.origin, 3, out.origin);
-    std::copy_n(asset.lower, 3, out.lower);
-    std::copy_n(asset.upper, 3, out.upper);
-    out.farthest = farthest_of(asset.extent);
     if (level.component_count == 1) return Status::kOk;
     Buffer<TriangleTopology> topology;
     Buffer<SurfaceComponent> components;
@@ -63,6 +60,8 @@ struct HostOf<GpuContainmentReport> : GpuHost<ContainmentState, GpuContainmentRe
   }
 
   Status set_assets(std::span<const GpuAsset> assets, cudaStream_t stream) {
+    asset_count = 0;
+    records = nullptr;
     std::size_t labelled = 0;
     for (const GpuAsset& asset : assets) {
       if (asset.tree.topology == nullptr) return Status::kNoTopology;
@@ -82,7 +81,17 @@ struct HostOf<GpuContainmentReport> : GpuHost<ContainmentState, GpuContainmentRe
     }
     if (status == Status::kOk) status = keep(labels.upload(made_labels.view(), stream));
     if (status == Status::kOk) status = keep(surfaces.upload(made.view(), stream));
-    return status == Status::kOk ? keep(cudaStreamSynchronize(stream)) : status;
+    if (status == Status::kOk) status = keep(cudaStreamSynchronize(stream));
+    if (status == Status::kOk) asset_count = static_cast<std::uint32_t>(assets.size());
+    return status;
+  }
+
+  Status follow(const GpuAsset* of_list) {
+    records = of_list;
+    return Status::kOk;
+  }
+  cudaError_t take_surfaces(cudaStream_t stream) const {
+    return records != nullptr ? follow_records(records, asset_count, surfaces.data(), stream) : cudaSuccess;
   }
 };
 
@@ -102,7 +111,8 @@ Status GpuContainmentQuery::enqueue(const GpuInstances& instances, const GpuPair
   args.groups = query.groups();
   args.query = query.device_report();
   args.capacity = host.capacity();
-  return host_->keep(gpu::find_contained(args, stream));
+  const auto take_surfaces = [&](const auto&, cudaStream_t on) { return host.take_surfaces(on); };
+  return host_->keep(gpu::queue(args, stream, take_surfaces, gpu::find_contained));
 }
 
 Status GpuContainmentQuery::find(const GpuInstances& instances, const GpuPairs& pairs,

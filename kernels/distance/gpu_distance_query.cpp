@@ -66,6 +66,11 @@ struct HostOf<GpuDistanceReport> : GpuHost<DistanceState, GpuDistanceReport> {
     return status == Status::kOk ? assets.set(given, all, *this, stream) : status;
   }
 
+  Status follow(const GpuAsset* of_list) {
+    assets.records = of_list;
+    return Status::kOk;
+  }
+
   Status reserve(const GpuDistanceCapacity& wanted, const GpuNoOptions&) {
     if (std::max({wanted.pairs, wanted.block_pairs, wanted.triangle_pairs, wanted.settled}) > kMostRoom)
       return Status::kOutOfGpuMemory;

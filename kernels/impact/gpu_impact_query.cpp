@@ -93,6 +93,11 @@ struct HostOf<GpuImpactReport> : GpuHost<ImpactState, GpuImpactReport> {
     return status == Status::kOk ? assets.set(given, all, *this, stream) : status;
   }
 
+  Status follow(const GpuAsset* of_list) {
+    assets.records = of_list;
+    return keep(contacts.follow(of_list), contacts);
+  }
+
   // There is always a part, which lanes without a block pair may look at.
   Status reserve(const GpuImpactCapacity& wanted, const GpuImpactOptions& options) {
     if (wanted.pairs > kMostPairs) return Status::kOutOfGpuMemory;

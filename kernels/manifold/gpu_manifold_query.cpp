@@ -5,6 +5,7 @@
 
 #include "kernels/common/check_options.h"
 #include "kernels/common/gpu_host.h"
+#include "kernels/manifold/follow_records.h"
 #include "kernels/manifold/manifold_data.h"
 #include "kernels/manifold/shape.h"
 
@@ -14,23 +15,13 @@ namespace {
 // Words of a tile's sum have 31 bits for manifolds and for points; pieces of a pair are found by 32 bits.
 constexpr std::uint64_t kMost = std::uint64_t{1} << 31;
 
-manifold::Shape shape_of(const GpuAsset& asset) {
-  manifold::Shape shape;
-  shape.triangles = asset.tree.triangles;
-  shape.topology = asset.tree.topology;
-  shape.blocks = asset.tree.blocks;
-  shape.oriented_blocks = asset.tree.oriented_blocks;
-  manifold::set_bounds(asset.lower, asset.upper, asset.origin, shape);
-  shape.triangle_count = asset.tree.triangle_count;
-  shape.closed = asset.tree.closed;
-  return shape;
-}
-
 }  // namespace
 
 template <>
 struct HostOf<GpuManifoldReport> : GpuHost<ManifoldState, GpuManifoldReport> {
   ArgArray<&ManifoldArgs::shapes> shapes{*this};
+  std::uint32_t asset_count = 0;
+  const GpuAsset* records = nullptr;  // to follow
 
   Room<std::uint32_t> of_pairs{*this};
   ArgArray<&ManifoldArgs::of_pair> of_pair{of_pairs};
@@ -83,19 +74,33 @@ struct HostOf<GpuManifoldReport> : GpuHost<ManifoldState, GpuManifoldReport> {
   }
 
   Status set_assets(std::span<const GpuAsset> given, cudaStream_t stream) {
+    asset_count = 0;
+    records = nullptr;
     if (!summary_of(given).topology) return Status::kNoTopology;
     Status status = provide_fixed_memory();
     if (status != Status::kOk) return status;
     std::unique_ptr<manifold::Shape[]> made(new (std::nothrow) manifold::Shape[given.size()]);
     if (made == nullptr) return Status::kOutOfMemory;
-    std::transform(given.begin(), given.end(), made.get(), shape_of);
+    std::transform(given.begin(), given.end(), made.get(), [](const GpuAsset& asset) {
+      return manifold::shape_of(asset.tree, asset.lower, asset.upper, asset.origin);
+    });
     ManifoldState initial = {};
     initial.step = 1;
     status = keep(shapes.upload({made.get(), given.size()}, stream));
     if (status == Status::kOk) status = keep(state.upload({&initial, 1}, stream));
     if (status == Status::kOk && table.room() != 0)
       status = keep(cudaMemsetAsync(table.data(), 0, table.bytes(), stream));
-    return status == Status::kOk ? keep(cudaStreamSynchronize(stream)) : status;
+    if (status == Status::kOk) status = keep(cudaStreamSynchronize(stream));
+    if (status == Status::kOk) asset_count = static_cast<std::uint32_t>(given.size());
+    return status;
+  }
+
+  Status follow(const GpuAsset* of_list) {
+    records = of_list;
+    return Status::kOk;
+  }
+  cudaError_t take_shapes(cudaStream_t stream) const {
+    return records != nullptr ? follow_records(records, asset_count, shapes.data(), stream) : cudaSuccess;
   }
 
   // Moves what the table holds to a larger one where there is room for more pairs than before.
@@ -166,7 +171,9 @@ Status GpuManifoldQuery::enqueue(const GpuInstances& instances, const GpuPairs& 
                                  cudaStream_t stream) {
   if (const Status status = check_most_points(options.most_points); status != Status::kOk) return status;
   const gpu::ManifoldArgs args = host_->args(instances, pairs, query, options);
-  return host_->keep(gpu::queue(args, stream, gpu::remember_points, gpu::make_patches, gpu::place_manifolds));
+  const auto take_shapes = [&](const auto&, cudaStream_t on) { return host_->take_shapes(on); };
+  return host_->keep(
+      gpu::queue(args, stream, take_shapes, gpu::remember_points, gpu::make_patches, gpu::place_manifolds));
 }
 
 Status GpuManifoldQuery::enqueue(const GpuInstances& instances, const GpuMoved& moved,
@@ -176,8 +183,10 @@ Status GpuManifoldQuery::enqueue(const GpuInstances& instances, const GpuMoved& 
   gpu::ManifoldArgs args = host_->args(instances, moved.moved, query, options);
   args.moved = moved;
   args.match_previous = true;
-  return host_->keep(gpu::queue(args, stream, gpu::remember_kept, gpu::remember_points, gpu::make_patches,
-                                gpu::count_kept_manifolds, gpu::place_manifolds, gpu::move_kept_manifolds));
+  const auto take_shapes = [&](const auto&, cudaStream_t on) { return host_->take_shapes(on); };
+  return host_->keep(gpu::queue(args, stream, take_shapes, gpu::remember_kept, gpu::remember_points,
+                                gpu::make_patches, gpu::count_kept_manifolds, gpu::place_manifolds,
+                                gpu::move_kept_manifolds));
 }
 
 Status GpuManifoldQuery::make(const GpuInstances& instances, const GpuMoved& moved,

@@ -47,6 +47,8 @@ struct HostOf<GpuMovedReport> : GpuHost<MovedState, GpuMovedReport> {
     return status;
   }
 
+  Status follow(const GpuAsset* of_list) { return of_list == nullptr ? Status::kOk : Status::kDeformed; }
+
   // The next call enters its pairs anew.
   Status empty_table() {
     if (table.room() == 0) return Status::kOk;

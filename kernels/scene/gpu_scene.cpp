@@ -5,6 +5,7 @@
 #include <new>
 #include <span>
 #include <type_traits>
+#include <utility>
 
 #include "kernels/geometry/pair_motion.h"
 #include "kernels/scene/scene_state.h"
@@ -12,6 +13,7 @@
 #include "tandem/formats/gpu_status.h"
 #include "tandem/kernels/gpu_broad_phase.h"
 #include "tandem/kernels/gpu_containment_query.h"
+#include "tandem/kernels/gpu_deformer.h"
 #include "tandem/kernels/gpu_distance_query.h"
 #include "tandem/kernels/gpu_excluded_pairs.h"
 #include "tandem/kernels/gpu_impact_query.h"
@@ -28,6 +30,13 @@ constexpr cudaStream_t kStream = nullptr;
 template <typename Query>
 struct QueryMemory : DeviceMemory {
   Query query;
+};
+
+/// An asset that deforms, and its positions on the GPU.
+struct DeformingAsset {
+  GpuDeformer deformer;
+  GpuArray<float> positions;
+  GpuArray<const float*> place;  // of the positions
 };
 
 /// While it lives, a GPU is the current one, and memory comes from an allocator.
@@ -59,12 +68,25 @@ class Gpu final : public SceneDevice {
   Status set_assets(SceneState& scene) override {
     assets_id_ = 0;
     const Here here(gpu_, allocator);
+    deforming_.reset();
     Status status = found_gpu_ == Status::kOk ? here.status() : found_gpu_;
     if (status == Status::kOk) status = upload_assets(scene);
     if (status != Status::kOk) return scene.fail(status, 0);
     assets_id_ = scene.assets_id;
     version_ = scene.version - 1;
     return status;
+  }
+
+  Status deform(SceneState&, std::uint32_t asset, std::span<const float> positions) override {
+    const Here here(gpu_, allocator);
+    Status status = here.status();
+    if (status == Status::kOk) status = begin_to_deform(asset);
+    if (status != Status::kOk) return status;
+    DeformingAsset& deforming = *deforming_[asset];
+    status = upload(positions, deforming.positions);
+    const float* const place = deforming.positions.data();
+    if (status == Status::kOk) status = upload(std::span(&place, 1), deforming.place);
+    return status == Status::kOk ? deforming.deformer.deform(deforming.place.data(), kStream) : status;
   }
 
   Status find_pairs(SceneState& scene, double reach, bool& fixed_kept, Buffer<ObjectPair>& pairs) override {
@@ -85,6 +107,7 @@ class Gpu final : public SceneDevice {
     on_gpu.sorted = on_gpu.grouped = true;
     on_gpu.within = options.within;
     on_gpu.add_error_bounds = options.add_error_bounds;
+    on_gpu.leave_out_rings = options.leave_out_rings;
     const auto find_contacts = [&](auto& query) {
       Status status = query.find_contacts(instances_, pairs_, on_gpu, kStream);
       if (status == Status::kOk) status = copy(query.contacts(), query.report().contacts, found.rows);
@@ -175,11 +198,12 @@ class Gpu final : public SceneDevice {
     return static_cast<const QueryMemory<Query>&>(memory).query;
   }
 
-  GpuAssetBounds bounds() const { return {bounds_.data(), static_cast<std::uint32_t>(assets_.size())}; }
+  GpuAssetBounds bounds() const { return list_.records().bounds_of_all(); }
 
-  static Status require_oriented_blocks(SceneState& scene) {
-    for (std::size_t i = 0; i < scene.assets.size(); ++i) {
-      if (scene.assets[i].tree.oriented_blocks == nullptr) return scene.fail(Status::kNoOrientedBlocks, i);
+  // The CPU's copy of a deformed tree has none, but the GPU's has.
+  Status require_oriented_blocks(SceneState& scene) const {
+    for (std::size_t i = 0; i < assets_.size(); ++i) {
+      if (assets_[i].tree.oriented_blocks == nullptr) return scene.fail(Status::kNoOrientedBlocks, i);
     }
     return Status::kOk;
   }
@@ -187,13 +211,9 @@ class Gpu final : public SceneDevice {
   Status upload_assets(SceneState& scene) {
     const std::size_t count = scene.assets.size();
     Buffer<AssetView> views;
-    Buffer<AssetBounds> bounds;
     levels_.clear();
-    if (!views.resize(count) || !bounds.resize(count) || !assets_.resize(count)) return Status::kOutOfMemory;
-    for (std::size_t i = 0; i < count; ++i) {
-      views[i] = scene.assets[i].view;
-      bounds[i] = asset_bounds(*views[i].header);
-    }
+    if (!views.resize(count) || !assets_.resize(count)) return Status::kOutOfMemory;
+    for (std::size_t i = 0; i < count; ++i) views[i] = scene.assets[i].view;
     if (const Status status = files_.upload(views.view(), Contents::all, kStream); status != Status::kOk)
       return status;
     for (std::size_t i = 0; i < count; ++i) {
@@ -202,8 +222,20 @@ class Gpu final : public SceneDevice {
         if (!levels_.push(gpu_asset(files_.level(i, l), views[i], l))) return Status::kOutOfMemory;
       }
     }
-    const Status status = upload(bounds.view(), bounds_);
-    return status == Status::kOk ? wait() : status;
+    return list_.set(assets_.view(), kStream);
+  }
+
+  Status begin_to_deform(std::uint32_t asset) {
+    if (deforming_ == nullptr)
+      deforming_.reset(new (std::nothrow) std::unique_ptr<DeformingAsset>[assets_.size()]);
+    if (deforming_ == nullptr) return Status::kOutOfMemory;
+    if (deforming_[asset] != nullptr) return Status::kOk;
+    std::unique_ptr<DeformingAsset> made(new (std::nothrow) DeformingAsset);
+    if (made == nullptr) return Status::kOutOfMemory;
+    const Status status =
+        made->deformer.begin(assets_.view(), std::span(&asset, 1), list_.records(), kStream);
+    if (status == Status::kOk) deforming_[asset] = std::move(made);
+    return status;
   }
 
   // Copies the bodies where they have changed. Removed ones are in no group, and so in no pair.
@@ -357,11 +389,11 @@ class Gpu final : public SceneDevice {
   // The query of a question, which knows these assets.
   template <typename Query>
   Status provide(std::unique_ptr<DeviceMemory>& memory, Query*& query) {
+    constexpr bool takes_levels = std::is_same_v<Query, GpuToleranceQuery>;
     if (memory == nullptr || memory->assets_id != assets_id_) {
       auto* const made = new (std::nothrow) QueryMemory<Query>;
       memory.reset(made);
       if (made == nullptr) return Status::kOutOfMemory;
-      constexpr bool takes_levels = std::is_same_v<Query, GpuToleranceQuery>;
       const Status status = made->query.set_assets((takes_levels ? levels_ : assets_).view(), kStream);
       if (status != Status::kOk) {
         memory.reset();
@@ -370,6 +402,9 @@ class Gpu final : public SceneDevice {
       made->assets_id = assets_id_;
     }
     query = &static_cast<QueryMemory<Query>&>(*memory).query;
+    if constexpr (!takes_levels) {
+      if (deforming_ != nullptr) return query->follow(list_.records().assets);
+    }
     return Status::kOk;
   }
 
@@ -378,8 +413,9 @@ class Gpu final : public SceneDevice {
   std::uint64_t assets_id_ = 0;  // of the scene's assets that are on the GPU
   std::uint64_t version_ = 0;    // of its bodies
   DeviceAssets files_;
-  Buffer<GpuAsset> assets_, levels_;  // the first level of each, and all
-  GpuArray<AssetBounds> bounds_;
+  Buffer<GpuAsset> assets_, levels_;                              // the first level of each, and all
+  GpuAssetList list_;                                             // of the first levels
+  std::unique_ptr<std::unique_ptr<DeformingAsset>[]> deforming_;  // by asset; null: none ever deformed
 
   // The arrays that are copied, and their copies.
   Buffer<std::uint32_t> asset_, group_, mask_;

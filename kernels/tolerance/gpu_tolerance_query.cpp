@@ -66,6 +66,8 @@ struct HostOf<GpuToleranceReport> : GpuHost<ToleranceState, GpuToleranceReport> 
     return Status::kOk;
   }
 
+  Status follow(const GpuAsset* of_list) { return of_list == nullptr ? Status::kOk : Status::kDeformed; }
+
   // There is room for as many pairs as the contact query has room for.
   Status reserve(const GpuToleranceCapacity& wanted, const GpuNoOptions&) {
     const GpuContactCapacity of_contacts = {wanted.pairs, wanted.pairs, wanted.undecided};

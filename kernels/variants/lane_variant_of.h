@@ -32,10 +32,12 @@ constexpr ManifoldLanes kManifoldLanes = {make_pieces,        sum_pieces,   leas
                                           next_near,          answer_lines};
 
 template <int kCount>
-constexpr LaneVariant kLaneVariantOf = {
-    block_pair_mask_of_lanes<kCount>, narrow_phase_of_lanes<kCount, false>,
-    narrow_phase_of_lanes<kCount, true>, nearest_phase_of_lanes<kCount>, &kManifoldLanes,
-    refit_of_lanes<kCount>};
+constexpr LaneVariant kLaneVariantOf = {block_pair_mask_of_lanes<kCount>,
+                                        narrow_phase_of_lanes<kCount, false>,
+                                        narrow_phase_of_lanes<kCount, true>,
+                                        nearest_phase_of_lanes<kCount>,
+                                        &kManifoldLanes,
+                                        refit_of_lanes<kCount>};
 
 }  // namespace
 }  // namespace tandem

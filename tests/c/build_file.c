@@ -1,11 +1,11 @@
 // Builds the triangles of an OBJ file in memory, with the provenance that another file has, and writes the
 // bytes. C99. Usage: build_file FOLDER NAME.obj WITH_PROVENANCE.bvh OUT.bvh FAST NO_GPU_BLOCKS NO_TOPOLOGY
-// FREE
+// NO_REFIT FREE
 #include "c_test.h"
 
 int main(int argc, char** argv) {
-  if (argc != 9)
-    return printf("usage: build_file FOLDER NAME FROM OUT FAST NO_GPU_BLOCKS NO_TOPOLOGY FREE\n"), 1;
+  if (argc != 10)
+    return printf("usage: build_file FOLDER NAME FROM OUT FAST NO_GPU_BLOCKS NO_TOPOLOGY NO_REFIT FREE\n"), 1;
   tandem_asset *from = NULL, *made = NULL;
   CHECK_STATUS(tandem_asset_open(argv[3], NULL, NULL, &from, NULL), TANDEM_OK);
   if (from == NULL) return 1;
@@ -18,7 +18,8 @@ int main(int argc, char** argv) {
                                   .effort = atoi(argv[5]) ? TANDEM_EFFORT_FAST : TANDEM_EFFORT_DEFAULT,
                                   .no_gpu_blocks = (uint32_t)atoi(argv[6]),
                                   .no_topology = (uint32_t)atoi(argv[7]),
-                                  .imaginary_share = atoi(argv[8]),
+                                  .no_refit = (uint32_t)atoi(argv[8]),
+                                  .imaginary_share = atoi(argv[9]),
                                   .provenance = provenance};
   Triangles triangles = read_obj(argv[1], argv[2]);
   tandem_mesh mesh = mesh_of(&triangles);

@@ -488,6 +488,10 @@ static void test_errors(void) {
   tandem_gpu_query_options options = grouped_contacts();
   CHECK_STATUS(tandem_gpu_contact_query_enqueue(queries.contacts, &scene.instances, &pairs, &options, stream),
                TANDEM_OUT_OF_RANGE);
+  options.leave_out_rings = 9;
+  CHECK_STATUS(tandem_gpu_contact_query_find(queries.contacts, &scene.instances, &pairs, &options, stream),
+               TANDEM_BAD_OPTION);
+  options.leave_out_rings = 0;
   options.mode = 3;
   CHECK_STATUS(tandem_gpu_contact_query_find(queries.contacts, &scene.instances, &pairs, &options, stream),
                TANDEM_BAD_OPTION);

@@ -158,7 +158,7 @@ static void test_bad_options(tandem_asset* cube) {
   options.self_pairs = 2;
   CHECK_STATUS(tandem_scene_find_contacts(scene, &options), TANDEM_BAD_OPTION);
   options.self_pairs = 0;
-  options.reserved = 1;
+  options.leave_out_rings = 9;
   CHECK_STATUS(tandem_scene_find_contacts(scene, &options), TANDEM_BAD_OPTION);
   const tandem_pair_options unlike = {sizeof unlike, 2, 0};
   CHECK_STATUS(tandem_scene_find_pairs(scene, &unlike), TANDEM_BAD_OPTION);

@@ -1,6 +1,7 @@
 // Does all that the C interface does, with meshes of assets/, and compares with numbers that are known. C99.
 // Usage: use_test ASSETS_FOLDER WORK_FOLDER
 #define _POSIX_C_SOURCE 200112L
+#include <math.h>
 #include <pthread.h>
 
 #include "c_test.h"
@@ -88,7 +89,7 @@ static void test_assets(void) {
   CHECK_STATUS(tandem_asset_from_memory(aligned, bytes, &borrowing, NULL, &all[4], NULL), TANDEM_OK);
   CHECK(tandem_asset_data(all[4], NULL) == aligned);
   for (int i = 0; i < 5; ++i) {
-    tandem_asset_info info = {sizeof info, 0, 0, 0, 0, 0, 0, {0}, 0, {0}, {0}};
+    tandem_asset_info info = {.struct_size = sizeof info};
     tandem_level level;
     level.struct_size = sizeof level;
     CHECK_STATUS(tandem_asset_get_info(all[i], &info), TANDEM_OK);
@@ -334,6 +335,51 @@ static void test_rows_and_calls(const tandem_allocator* allocator) {
   tandem_scene_destroy(scene);
 }
 
+// Two squares, one above the other, of which the lower one is bent upwards.
+static void test_deforming(void) {
+  const double positions[] = {0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0};
+  const uint32_t triangles[] = {0, 1, 2, 0, 2, 3};
+  const tandem_mesh mesh = {
+      .struct_size = sizeof mesh, .positions = positions, .vertex_count = 4, .triangles = triangles, .triangle_count = 2};
+  tandem_asset* assets[2];
+  CHECK_STATUS(tandem_asset_build(&mesh, NULL, NULL, &assets[0], NULL), TANDEM_OK);
+  assets[1] = assets[0];
+  tandem_asset_info info = {.struct_size = sizeof info};
+  CHECK_STATUS(tandem_asset_get_info(assets[0], &info), TANDEM_OK);
+  CHECK(info.source_vertices == 4);
+  tandem_scene* scene = NULL;
+  CHECK_STATUS(tandem_scene_create(NULL, &scene), TANDEM_OK);
+  CHECK_STATUS(tandem_scene_set_assets(scene, assets, 2), TANDEM_OK);
+  tandem_instance bodies[2] = {at(0, 0, 0), at(0, 0, 1)};
+  bodies[1].asset = 1;
+  CHECK_STATUS(tandem_scene_place(scene, bodies, 2, NULL), TANDEM_OK);
+  CHECK_STATUS(tandem_scene_find_contacts(scene, NULL), TANDEM_OK);
+  CHECK(contact_count(scene) == 0 && tandem_scene_looseness(scene, 0) == 1);
+  float bent[] = {0, 0, 0, 1, 0, 0, 1, 1, 2, 0, 1, 0};
+  CHECK_STATUS(tandem_scene_deform(scene, 0, bent, 4), TANDEM_OK);
+  CHECK_STATUS(tandem_scene_find_manifolds(scene, NULL), TANDEM_CONTACTS_MISSING);
+  CHECK_STATUS(tandem_scene_find_contacts(scene, NULL), TANDEM_OK);
+  CHECK(contact_count(scene) == 4 && tandem_scene_looseness(scene, 0) > 0);
+  double near[] = {0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0};
+  near[8] = 1 - 1e-15;  // no float32 number, and still apart
+  CHECK_STATUS(tandem_scene_deform_f64(scene, 0, near, 4), TANDEM_OK);
+  CHECK_STATUS(tandem_scene_find_contacts(scene, NULL), TANDEM_OK);
+  CHECK(contact_count(scene) == 0);
+  CHECK_STATUS(tandem_scene_find_manifolds(scene, NULL), TANDEM_NOT_FLOAT32);
+  CHECK_STATUS(tandem_scene_find_verdicts(scene, NULL), TANDEM_DEFORMED);
+  CHECK(tandem_scene_where(scene) == 0);
+  bent[7] = NAN;
+  CHECK_STATUS(tandem_scene_deform(scene, 1, bent, 4), TANDEM_OUT_OF_RANGE);
+  CHECK(tandem_scene_where(scene) == 2);
+  CHECK_STATUS(tandem_scene_deform(scene, 1, bent, 3), TANDEM_VERTEX_COUNT_MISMATCH);
+  CHECK_STATUS(tandem_scene_deform(scene, 2, bent, 4), TANDEM_UNKNOWN_ASSET);
+  CHECK_STATUS(tandem_scene_deform(scene, 1, NULL, 4), TANDEM_NULL_ARGUMENT);
+  CHECK_STATUS(tandem_scene_deform(NULL, 1, bent, 4), TANDEM_NULL_ARGUMENT);
+  CHECK(tandem_scene_looseness(NULL, 0) == 1);
+  tandem_scene_destroy(scene);
+  tandem_asset_release(assets[0]);
+}
+
 // Two threads, a scene each, one asset, which goes while they work.
 typedef struct Job {
   tandem_asset* asset;
@@ -380,6 +426,7 @@ int main(int argc, char** argv) {
   test_assets();
   test_building();
   test_rows_and_calls(NULL);
+  test_deforming();
   test_threads();
   // All memory of handles and results is the allocator's, and comes back.
   test_rows_and_calls(&allocator);

@@ -81,7 +81,7 @@ if(NOT output STREQUAL "0 pairs of triangles meet\n")
   message(FATAL_ERROR "the program in C says of bodies that do not meet: ${output}")
 endif()
 # The builder in the library makes the same bytes.
-run(${FOLDER}/consumer/build_file ${SOURCE}/assets box_12.obj ${FOLDER}/box.bvh ${FOLDER}/made.bvh 0 0 0 0)
+run(${FOLDER}/consumer/build_file ${SOURCE}/assets box_12.obj ${FOLDER}/box.bvh ${FOLDER}/made.bvh 0 0 0 0 0)
 run(${CMAKE_COMMAND} -E compare_files ${FOLDER}/box.bvh ${FOLDER}/made.bvh)
 
 # As a part of another project Tandem has no parts for GPUs unless these are asked for.

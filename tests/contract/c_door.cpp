@@ -142,6 +142,7 @@ class CDoor final : public Door {
       chosen.self_pairs = flag(options, "self_pairs");
       chosen.add_error_bounds = flag(options, "add_error_bounds");
       chosen.within = number(options, "within", 0);
+      chosen.leave_out_rings = options.value("leave_out_rings", 0u);
       about(chosen);
       return answered(tandem_scene_find_contacts(scene_, &chosen), TANDEM_CONTACTS, tandem_scene_contacts,
                       &tandem_counters::contacts);

@@ -23,7 +23,7 @@ COMMANDS = {"pairs": ["query"], "contacts": ["query"], "manifolds": ["query", "-
 # The group of a question's columns in the file that is written, where it is not the question's name.
 GROUPS = {"distances": "distance", "impacts": "impact", "verdicts": "verdict"}
 FLAGS = {"first_contact_only": "--first-contact", "self_pairs": "--self"}
-NUMBERS = {"mode": "--mode", "within": "--within", "reach": "--reach", "absolute_tolerance": "--absolute", "relative_tolerance": "--tolerance",
+NUMBERS = {"mode": "--mode", "within": "--within", "leave_out_rings": "--leave-out-rings", "reach": "--reach", "absolute_tolerance": "--absolute", "relative_tolerance": "--tolerance",
            "tolerance": "--tolerance", "duration": "--dt"}
 COUNTERS = {"inside": "contained", "outer_open": None}
 DONE, USAGE, UNREADABLE_INPUT = range(3)

@@ -109,7 +109,8 @@ class CppDoor final : public Door {
                         .first_contact_only = flag(options, "first_contact_only"),
                         .self_pairs = flag(options, "self_pairs"),
                         .within = number(options, "within", 0),
-                        .add_error_bounds = flag(options, "add_error_bounds")});
+                        .add_error_bounds = flag(options, "add_error_bounds"),
+                        .leave_out_rings = options.value("leave_out_rings", 0u)});
   }
 
   Found manifolds(const Json& options) {

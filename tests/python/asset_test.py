@@ -34,6 +34,7 @@ def test_shows_its_mesh_in_the_files_coordinates(box):
     ("box_48", {}, []),
     ("cow_1500", {"effort": "fast"}, ["--effort", "fast"]),
     ("box_192", {"topology": False, "gpu_blocks": False}, ["--no-topology", "--no-gpu-blocks"]),
+    ("box_48", {"refit": False}, ["--no-refit"]),
     ("cow_1500", {"effort": "fast", "imaginary_share": 1.0}, ["--effort", "fast", "--imaginary", "free"])])
 def test_build_makes_the_bytes_of_bvhbuild(tmp_path, name, options, words):
     written = tmp_path / "written.bvh"

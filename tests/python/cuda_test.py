@@ -307,6 +307,13 @@ def test_filters_and_pairs(torch, assets):
         query.contacts(bodies, filter=cuda.Filter(motion=torch.zeros(3, dtype=torch.uint8, device="cuda")))
     near = query.contacts(bodies, within=0.02, sorted=True)
     assert np.array_equal(near.contacts.numpy(), sorted_contacts(on_cpu.place(instances).contacts(within=0.02).contacts))
+    selves = np.repeat(np.arange(3, dtype=np.uint32), 2).reshape(-1, 2)
+    for rings in (0, 1, 2):
+        found = query.contacts(bodies, pairs=torch.from_numpy(selves.astype(np.int32)).cuda(), within=0.02, leave_out_rings=rings, sorted=True)
+        expected = on_cpu.place(instances).contacts(pairs=selves, within=0.02, leave_out_rings=rings)
+        assert np.array_equal(found.contacts.numpy(), sorted_contacts(expected.contacts))
+    with pytest.raises(ValueError, match="leave_out_rings is 9 where 0 to 8"):
+        query.contacts(bodies, leave_out_rings=9)
 
 
 @needs_gpu

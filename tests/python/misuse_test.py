@@ -93,6 +93,9 @@ CASES = [
     (lambda s: tandem.Filter(motion=[0], group=[1, 2]), ValueError, "group has shape"),
     (lambda s: tandem.Filter(excluded=[[0, -7]]), ValueError, "excluded: row 0"),
     (lambda s: s.contacts(within=0.1) and s.contained(), tandem.Error, "were not found"),
+    (lambda s: s.contacts(leave_out_rings=-1), ValueError, "leave_out_rings is -1 where 0 to 8"),
+    (lambda s: s.contacts(leave_out_rings=9), ValueError, "leave_out_rings is 9 where 0 to 8"),
+    (lambda s: s.contacts(leave_out_rings=1.0), TypeError, "leave_out_rings is float"),
     (lambda s: s.manifolds(most_points=0), ValueError, "most_points is 0"),
     (lambda s: s.manifolds(most_points=8), ValueError, "most_points is 8"),
     (lambda s: s.distances(reach=[1]), TypeError, "reach is list"),
@@ -162,6 +165,7 @@ FLAGS = [
     ("match_previous", lambda s, value: s.manifolds(match_previous=value)),
     ("gpu_blocks", lambda s, value: tandem.build(BOX_VERTICES, BOX_FACES, gpu_blocks=value)),
     ("topology", lambda s, value: tandem.build(BOX_VERTICES, BOX_FACES, topology=value)),
+    ("refit", lambda s, value: tandem.build(BOX_VERTICES, BOX_FACES, refit=value)),
     ("return_report", lambda s, value: tandem.build(BOX_VERTICES, BOX_FACES, return_report=value)),
 ]
 for name, ask in FLAGS:

@@ -25,7 +25,7 @@ class Box:
 
 def assets(folder: Path) -> list[tandem.Asset]:
     shares: list[float] = []
-    made, report = tandem.build(VERTICES, FACES, effort="best", threads=2, gpu_blocks=True, topology=True, imaginary_share=0.5, face_ids=range(12),
+    made, report = tandem.build(VERTICES, FACES, effort="best", threads=2, gpu_blocks=True, topology=True, refit=True, imaginary_share=0.5, face_ids=range(12),
                                 parts=[("box", "", 12)], provenance="{}", progress=shares.append, return_report=True)
     count: int = report.degenerate
     same: tandem.Asset = tandem.build(Box(), effort="fast")
@@ -48,7 +48,7 @@ def ask(scene: tandem.Scene) -> None:
     filter = tandem.Filter(motion=[tandem.MOVING, tandem.FIXED], group=[1, 1], mask=[1, 1], excluded=[[0, 0]])
     scene.threads = 2
     contacts: tandem.Contacts = scene.place(rows, filter=filter).contacts(mode="exact", first_contact_only=False, self_pairs=False, within=0.0,
-                                                                          add_error_bounds=False)
+                                                                          add_error_bounds=False, leave_out_rings=1)
     work: tandem.Counters = contacts.counters
     touching: npt.NDArray[np.void] = contacts.touching
     faces: npt.NDArray[np.uint32] = contacts.contacts["face_a"]

@@ -10,7 +10,7 @@
 namespace tandem::bench {
 namespace {
 
-using Contacts = std::vector<TriangleContact>;
+using TriangleContacts = std::vector<TriangleContact>;
 
 // Bodies a and b, and a triangle of each.
 using BodyContact = std::array<std::uint32_t, 4>;
@@ -29,10 +29,10 @@ void note_least(double& least, std::uint32_t repeat, double seconds) {
 }
 
 // The positions of the shapes that bend, in their order.
-using Frame = std::vector<Positions>;
+using FramePositions = std::vector<Positions>;
 
-Frame read_frame(const BendingScene& scene, std::uint32_t number) {
-  Frame frame;
+FramePositions read_frame(const BendingScene& scene, std::uint32_t number) {
+  FramePositions frame;
   for (const std::uint32_t shape : scene.bending) frame.push_back(scene.positions(shape, number));
   return frame;
 }
@@ -50,7 +50,7 @@ class Follower {
   }
 
   Engine& engine() { return *engine_; }
-  const Contacts& contacts() const { return contacts_; }
+  const TriangleContacts& contacts() const { return contacts_; }
   const std::vector<ObjectPair>& pairs() const { return pairs_; }
 
   // Starts anew with these shapes, as they are.
@@ -61,7 +61,7 @@ class Follower {
   }
 
   // Result: the largest looseness of the shapes.
-  std::optional<double> follow(const Frame& frame, std::uint32_t number) {
+  std::optional<double> follow(const FramePositions& frame, std::uint32_t number) {
     std::optional<double> loosest;
     for (std::size_t i = 0; i < frame.size(); ++i)
       loosest = std::max(loosest, deform(*engine_, scene_.bending[i], frame[i], scene_.path, number));
@@ -90,7 +90,7 @@ class Follower {
     if (own_) work.block_pairs = engine_->counters().block_pairs;
   }
 
-  FrameWork work(const Frame& frame, std::uint32_t number, std::span<const ObjectPair> pairs) {
+  FrameWork work(const FramePositions& frame, std::uint32_t number, std::span<const ObjectPair> pairs) {
     FrameWork work;
     for (std::uint32_t i = 0; i < options_.repeats; ++i) {
       note_least(work.update_seconds, i,
@@ -107,7 +107,7 @@ class Follower {
   const bool own_;
   std::unique_ptr<Engine> engine_;
   std::vector<ObjectPair> pairs_;
-  Contacts contacts_;
+  TriangleContacts contacts_;
 };
 
 /// Trees that are built anew for each frame, and what is asked of them.
@@ -120,7 +120,8 @@ class Rebuilder {
 
   // A file holds float32 numbers: where positions are others, the new trees are refitted to these. Result:
   // nothing where a shape has no triangle left.
-  std::optional<FrameWork> work(const Frame& frame, std::uint32_t number, std::span<const ObjectPair> pairs) {
+  std::optional<FrameWork> work(const FramePositions& frame, std::uint32_t number,
+                                std::span<const ObjectPair> pairs) {
     FrameWork work;
     bool has_trees = true;
     work.update_seconds = seconds_by(options_.threads, [&] { has_trees = build(frame); });
@@ -152,7 +153,7 @@ class Rebuilder {
   }
 
  private:
-  bool build(const Frame& frame) {
+  bool build(const FramePositions& frame) {
     for (std::size_t i = 0; i < frame.size(); ++i) {
       if (!rebuilt_[i].build(frame[i], options_.threads)) return false;
       views_[scene_.bending[i]] = rebuilt_[i].view();
@@ -230,7 +231,7 @@ std::vector<PeerFrames> measure_frames(const BendingScene& scene, const DeformOp
     results.push_back({others.back()->engine().label(), others.back()->engine().settings(), {}});
   }
   for (std::uint32_t number = 0; number < options.frames; ++number) {
-    const Frame frame = read_frame(scene, number);
+    const FramePositions frame = read_frame(scene, number);
     const std::span<const ObjectPair> given =
         scene.given_pairs != nullptr ? std::span(*scene.given_pairs) : std::span<const ObjectPair>();
     if (number == 0) tandem.follow(frame, number);  // makes the copies of the trees

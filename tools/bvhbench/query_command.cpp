@@ -231,7 +231,7 @@ void check_options(const QueryArguments& arguments) {
 // The command prints and writes rows about pairs of bodies here, so options of contacts do not go with it.
 ExitCode run_by_tolerance(const QueryArguments& arguments) {
   if (arguments.mode != QueryMode::exact || arguments.first_contact || arguments.within > 0 ||
-      arguments.self_pairs || arguments.leave_out_rings > 0 || arguments.frame ||
+      arguments.self_pairs || arguments.frame || arguments.leave_out_rings > 0 ||
       arguments.takes_all_contacts() || arguments.is_for_gpu()) {
     throw UsageError("--tolerance finds no contacts, so options that are about them do not go with it");
   }
@@ -285,11 +285,11 @@ void add_query(Command tool, Run& run_later) {
        {"--at", arguments.at, "X Y Z", "also which bodies' world boxes contain this point",
         between(-kLargestWorldCoordinate, kLargestWorldCoordinate)},
        {"--self", arguments.self_pairs, "also each instance with itself"},
-       {"--frame", arguments.frame, "N", "of the scene's deformations; without it nothing bends",
-        between(0, 4e9)},
        {"--leave-out-rings", arguments.leave_out_rings, "N [0]",
         "of an instance with itself: leave out triangles that share a vertex (1), or that N - 1 edges join",
         between(0, kMostRings)},
+       {"--frame", arguments.frame, "N", "of the scene's deformations; without it nothing bends",
+        between(0, 4e9)},
        threads_option(arguments, "the contacts do"),
        repeat_option(arguments),
        output_option(arguments, "the contacts file to write; appears whole or not at all"),

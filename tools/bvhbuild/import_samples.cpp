@@ -14,7 +14,8 @@ namespace {
 std::string pose_defect(const std::vector<Point>& pose) {
   for (std::size_t v = 0; v < pose.size(); ++v) {
     for (const double x : pose[v]) {
-      if (!std::isfinite(x)) return "vertex " + std::to_string(v) + " has a coordinate that is NaN or infinite";
+      if (!std::isfinite(x))
+        return "vertex " + std::to_string(v) + " has a coordinate that is NaN or infinite";
       if (std::abs(x) > double{kMaxCoordinate})
         return "vertex " + std::to_string(v) + " has a coordinate too large for float32";
     }
@@ -32,9 +33,9 @@ std::string mesh_difference(const PolygonMesh& mesh, const PolygonMesh& pose, co
   if (pose.face_count() != mesh.face_count()) return counts(pose.face_count(), mesh.face_count(), "faces");
   for (std::size_t face = 0; face < mesh.face_count(); ++face) {
     const std::uint32_t begin = mesh.face_begin[face], end = mesh.face_begin[face + 1];
-    const bool same = pose.face_begin[face] == begin && pose.face_begin[face + 1] == end &&
-                      std::equal(mesh.corners.begin() + begin, mesh.corners.begin() + end,
-                                 pose.corners.begin() + begin);
+    const bool same =
+        pose.face_begin[face] == begin && pose.face_begin[face + 1] == end &&
+        std::equal(mesh.corners.begin() + begin, mesh.corners.begin() + end, pose.corners.begin() + begin);
     if (!same) return "face " + with_commas(face) + " has other vertices than in " + name;
   }
   return {};

@@ -14,8 +14,8 @@ namespace {
 
 constexpr int kPoses = 32;
 
-// Poses of the mesh against itself, each of which brings a corner of some triangle to one of another and turns
-// the mesh at random about it. They depend on the triangles and not on a tree.
+// Poses of the mesh against itself, each of which brings a corner of some triangle to one of another and
+// turns the mesh at random about it. They depend on the triangles and not on a tree.
 std::vector<Pose> touching_poses(const Geometry& geometry) {
   Random random(1);
   const auto corner = [&] {
@@ -85,7 +85,8 @@ std::optional<SampleSummary> summary_of(const std::vector<SampleWork>& samples) 
 
 Json samples_json(const std::vector<SampleWork>& samples) {
   const auto rounded = [](double ratio) { return std::round(1e4 * ratio) / 1e4; };
-  Json json = {{"count", samples.size()}, {"mean_ratio", nullptr}, {"worst_ratio", nullptr}, {"worst", nullptr}};
+  Json json = {
+      {"count", samples.size()}, {"mean_ratio", nullptr}, {"worst_ratio", nullptr}, {"worst", nullptr}};
   if (const auto summary = summary_of(samples)) {
     json["mean_ratio"] = rounded(summary->mean_ratio);
     json["worst_ratio"] = rounded(summary->worst_ratio);

@@ -197,7 +197,7 @@ public unsafe struct tandem_contact_options {
   public uint first_contact_only;
   public uint self_pairs;
   public uint add_error_bounds;
-  public uint reserved;
+  public uint leave_out_rings;
   public double within;
   public tandem_object_pair* pairs;
   public UIntPtr pair_count;

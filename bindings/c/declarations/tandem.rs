@@ -388,7 +388,7 @@ pub struct tandem_contact_options {
     pub first_contact_only: u32,
     pub self_pairs: u32,
     pub add_error_bounds: u32,
-    pub reserved: u32,
+    pub leave_out_rings: u32,
     pub within: f64,
     pub pairs: *const tandem_object_pair,
     pub pair_count: usize,

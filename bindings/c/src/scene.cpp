@@ -91,13 +91,14 @@ tandem_status place(tandem_scene& self, const tandem_instance* instances, size_t
 // The options of the libraries. Those that are not looked at here are checked by the libraries.
 tandem_status read_options(const tandem_contact_options& given, ContactOptions& options) {
   if (given.mode > TANDEM_BOXES || given.first_contact_only > 1 || given.self_pairs > 1 ||
-      given.add_error_bounds > 1 || given.reserved != 0)
+      given.add_error_bounds > 1)
     return TANDEM_BAD_OPTION;
   options.mode = static_cast<QueryMode>(given.mode);
   options.first_contact_only = given.first_contact_only != 0;
   options.self_pairs = given.self_pairs != 0;
   options.within = given.within;
   options.add_error_bounds = given.add_error_bounds != 0;
+  options.leave_out_rings = given.leave_out_rings;
   return TANDEM_OK;
 }
 

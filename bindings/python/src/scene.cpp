@@ -108,7 +108,7 @@ class Scene {
   }
 
   nb::tuple contacts(nb::handle pairs, std::uint32_t mode, bool first_contact_only, bool self_pairs,
-                     double within, bool add_error_bounds) {
+                     double within, bool add_error_bounds, std::uint32_t leave_out_rings) {
     const Turn turn = take_turn();
     const GivenPairs given(pairs);
     auto options = sized<tandem_contact_options>();
@@ -117,6 +117,7 @@ class Scene {
     options.self_pairs = self_pairs;
     options.add_error_bounds = add_error_bounds;
     options.within = within;
+    options.leave_out_rings = leave_out_rings;
     given.put_into(options);
     find_contacts(options);
     auto counters = sized<tandem_counters>();
@@ -279,7 +280,8 @@ void add_scenes(nb::module_& module) {
       .def("instances", &Scene::instances)
       .def("count", &Scene::count)
       .def("pairs", &Scene::pairs)
-      .def("contacts", &Scene::contacts, none(), nb::arg(), nb::arg(), nb::arg(), nb::arg(), nb::arg())
+      .def("contacts", &Scene::contacts, none(), nb::arg(), nb::arg(), nb::arg(), nb::arg(), nb::arg(),
+           nb::arg())
       .def("moved", &Scene::moved, nb::arg(), none(), none())
       .def("manifolds", &Scene::manifolds)
       .def("contained", &Scene::contained)

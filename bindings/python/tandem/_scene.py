@@ -354,7 +354,7 @@ class Scene:
         return Moved(_frombuffer(found[0], PAIR), _frombuffer(found[1], PAIR))
 
     def contacts(self, *, pairs: npt.ArrayLike | None = None, mode: Literal["exact", "fast", "boxes"] = "exact", first_contact_only: bool = False,
-                 self_pairs: bool = False, within: float = 0.0, add_error_bounds: bool = False) -> Contacts:
+                 self_pairs: bool = False, within: float = 0.0, add_error_bounds: bool = False, leave_out_rings: int = 0) -> Contacts:
         """Finds every pair of triangles that meet.
 
         Args:
@@ -364,6 +364,7 @@ class Scene:
             self_pairs: where the scene finds the pairs, also each body with itself.
             within: clearance: triangles at most so far apart count, decided exactly.
             add_error_bounds: a pair without a contact is surely apart at the finest levels too.
+            leave_out_rings: of a body with itself, 0 to 8: with 1, triangles that share a vertex are left out; with n, those that a path of n - 1 edges joins.
 
         Returns:
             Contacts: unpacks into pairs, contacts and counters; `touching` are the pairs that have a contact.
@@ -374,7 +375,7 @@ class Scene:
         """
         found = self._core.contacts(None if pairs is None else pairs_of(pairs), _MODES[mode] if mode in _MODES else _choice("mode", mode, tuple(_MODES)),
                                     flag(first_contact_only, "first_contact_only"), flag(self_pairs, "self_pairs"), amount(within, "within", FARTHEST),
-                                    flag(add_error_bounds, "add_error_bounds"))
+                                    flag(add_error_bounds, "add_error_bounds"), whole_number(leave_out_rings, "leave_out_rings", 0, 8))
         return Contacts(_frombuffer(found[0], PAIR), _frombuffer(found[1], CONTACT), Counters._make(found[2]))
 
     def manifolds(self, *, most_points: int = 7, match_previous: bool = True, keep: bool = False) -> Manifolds:

@@ -15,7 +15,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ._arrays import FARTHEST, FINITE, amount, flag, pairs_of
+from ._arrays import FARTHEST, FINITE, amount, flag, pairs_of, whole_number
 from ._asset import Asset, _choice
 from ._errors import Error
 from ._rows import CONTACT, CONTAINMENT, DISTANCE, IMPACT, MANIFOLD, PAIR, POINT, VERDICT
@@ -287,7 +287,7 @@ class Query:
 
     def contacts(self, instances: Instances | None = None, *, asset: Any = None, pose: Any = None, pairs: Any = None,
                  mode: Literal["exact", "fast", "boxes"] = "exact", first_contact_only: bool = False, within: float = 0.0, add_error_bounds: bool = False,
-                 sorted: bool = False, grouped: bool = False, filter: Filter | None = None, stream: Any = None) -> Contacts:
+                 leave_out_rings: int = 0, sorted: bool = False, grouped: bool = False, filter: Filter | None = None, stream: Any = None) -> Contacts:
         """Finds every pair of triangles that meet: the same set as on the CPU.
 
         Args:
@@ -299,8 +299,8 @@ class Query:
         """
         bodies, given, chosen, on = self._about(instances, asset, pose, pairs, filter, stream)
         found = self._core.contacts(bodies, given, _choice("mode", mode, _MODES), flag(first_contact_only, "first_contact_only"),
-                                    amount(within, "within", FARTHEST), flag(add_error_bounds, "add_error_bounds"), flag(sorted, "sorted"),
-                                    flag(grouped, "grouped"), chosen, on)
+                                    amount(within, "within", FARTHEST), flag(add_error_bounds, "add_error_bounds"),
+                                    whole_number(leave_out_rings, "leave_out_rings", 0, 8), flag(sorted, "sorted"), flag(grouped, "grouped"), chosen, on)
         self._given = pairs
         return Contacts(_found(found[0], pairs), Rows(found[1], CONTACT), Counters._make(found[2]))
 
@@ -351,7 +351,8 @@ class Query:
         return Verdicts(_found(found[0], pairs), Rows(found[1], VERDICT))
 
     def reserve(self, *, instances: int, pairs: int, contacts: int, undecided: int | None = None, mode: Literal["exact", "fast", "boxes"] = "exact",
-                first_contact_only: bool = False, within: float = 0.0, add_error_bounds: bool = False, sorted: bool = False, grouped: bool = False) -> None:
+                first_contact_only: bool = False, within: float = 0.0, add_error_bounds: bool = False, leave_out_rings: int = 0, sorted: bool = False,
+                grouped: bool = False) -> None:
         """Makes room for calls of `enqueue`, and says how they look for contacts. What was queued before keeps its own room.
 
         Args:
@@ -359,7 +360,7 @@ class Query:
         """
         self._step = _cuda.Step(self._assets, instances, pairs, contacts, contacts if undecided is None else undecided, _choice("mode", mode, _MODES),
                                 flag(first_contact_only, "first_contact_only"), amount(within, "within", FARTHEST), flag(add_error_bounds, "add_error_bounds"),
-                                flag(sorted, "sorted"), flag(grouped, "grouped"))
+                                whole_number(leave_out_rings, "leave_out_rings", 0, 8), flag(sorted, "sorted"), flag(grouped, "grouped"))
 
     def enqueue(self, instances: Instances | None = None, *, asset: Any = None, pose: Any = None, pairs: Any = None, filter: Filter | None = None,
                 stream: Any = None) -> Queued:

@@ -4,11 +4,13 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <memory>
 #include <tuple>
 #include <type_traits>
 #include <vector>
 
 #include "kernels/contact/contact_query_fixture.h"
+#include "kernels/refit/bent_mesh.h"
 #include "tandem/kernels/containment_query.h"
 #include "tandem/kernels/distance_query.h"
 #include "tandem/kernels/impact_query.h"
@@ -45,6 +47,7 @@ struct Questions {
   DistanceQuery distances;
   ImpactQuery impacts;
   ToleranceQuery verdicts;
+  Status of_verdicts = Status::kOk;  // kDeformed: they are not offered
 
   /// Asks them. match_previous: whether points are looked for among those of the call before.
   void ask(Scene& scene, double reach, bool self_pairs, bool match_previous) {
@@ -55,7 +58,7 @@ struct Questions {
       for (double& x : motion[i].angular_velocity) x = random.symmetric(1);
       std::copy_n(scene.instances()[i].pose.translation, 3, motion[i].centre);
     }
-    ASSERT_EQ(verdicts.find(scene, {.tolerance = 0.1}), Status::kOk);
+    ASSERT_EQ(verdicts.find(scene, {.tolerance = 0.1}), of_verdicts);
     ASSERT_EQ(impacts.find(scene, {.motion = motion, .duration = 0.2}), Status::kOk);
     ASSERT_EQ(contacts.find(scene, {.self_pairs = self_pairs}), Status::kOk);
     ASSERT_EQ(distances.find(scene, {.reach = reach}), Status::kOk);
@@ -388,8 +391,152 @@ TYPED_TEST_P(SceneOn, AnswersOfNoBodiesAreEmpty) {
   }
 }
 
+/// Files of bodies that can bend, and a rigid one.
+struct BendingBodies {
+  std::vector<test::Mesh> meshes;
+  std::vector<std::unique_ptr<test::Bytes>> files;
+  std::vector<AssetView> views;
+  std::vector<Instance> instances;
+
+  explicit BendingBodies(RandomPoses& random) {
+    for (const test::Mesh& mesh : {test::sheet(2, 6), test::cube(0.75f, 4), test::random_mesh(60, 7),
+                                   test::sphere(0.8, 3), test::cube(0.6f, 3)}) {
+      meshes.push_back(test::welded(mesh));
+      files.push_back(std::make_unique<test::Bytes>(test::make_refittable_file(meshes.back())));
+      views.push_back(files.back()->check().asset);
+    }
+    for (std::uint32_t body = 0; body < 20; ++body) {
+      Pose pose = test::any_rotation(random);
+      for (double& t : pose.translation) t = random.symmetric(1.5);
+      instances.push_back({body % 5, pose});
+    }
+  }
+
+  std::vector<float> bent(std::uint32_t asset, std::span<const test::Bend> bends, RandomPoses& random) const {
+    return test::single(test::bent(bends[random.below(bends.size())], random.symmetric(2),
+                                   test::positions_of(meshes[asset]), random));
+  }
+};
+
+/// Bodies bend, move, and bend again, as those of a scene on the CPU.
+TYPED_TEST_P(SceneOn, AnswersQuestionsAboutBodiesThatBend) {
+  RandomPoses random(31);
+  const BendingBodies bodies(random);
+  TypeParam scene;
+  Scene on_cpu;
+  Questions here, there;
+  const auto in_both = [&](const auto& change) {
+    ASSERT_EQ(change(scene), Status::kOk);
+    ASSERT_EQ(change(on_cpu), Status::kOk);
+  };
+  in_both([&](Scene& of) { return of.set_assets(bodies.views); });
+  in_both([&](Scene& of) { return of.place(bodies.instances); });
+  constexpr test::Bend kMild[] = {test::Bend::twist, test::Bend::shear, test::Bend::wave,
+                                  test::Bend::inside_out};
+  std::size_t contacts = 0, contained = 0;
+  for (int step = 0; step < 8; ++step) {
+    SCOPED_TRACE(testing::Message() << "step " << step);
+    if (step > 0) {
+      here.of_verdicts = there.of_verdicts = Status::kDeformed;
+      for (std::uint32_t asset = 0; asset < 4; ++asset) {
+        if (step > 1 && random.below(2) == 0) continue;
+        const std::vector<float> now = bodies.bent(asset, kMild, random);
+        in_both([&](Scene& of) { return of.deform(asset, now); });
+      }
+    }
+    Pose pose = test::any_rotation(random);
+    for (double& t : pose.translation) t = random.symmetric(1.5);
+    in_both([&](Scene& of) { return of.move(static_cast<std::uint32_t>(step), pose); });
+    here.ask(scene, 0.5, step % 2 != 0, step != 3);
+    there.ask(on_cpu, 0.5, step % 2 != 0, step != 3);
+    expect_same_answers(here, there);
+    contacts += here.contacts.rows().size();
+    contained += here.contained.rows().size();
+  }
+  EXPECT_GT(contacts, 1000u);
+  EXPECT_GT(contained, 0u);
+}
+
+/// Wild shapes, among them flat ones, points, and coordinates of 1e15: contacts are asked for in every way.
+TYPED_TEST_P(SceneOn, FindsContactsOfBodiesThatBendWildly) {
+  RandomPoses random(32);
+  const BendingBodies bodies(random);
+  TypeParam scene;
+  Scene on_cpu;
+  ASSERT_EQ(scene.set_assets(bodies.views), Status::kOk);
+  ASSERT_EQ(on_cpu.set_assets(bodies.views), Status::kOk);
+  ASSERT_EQ(scene.place(bodies.instances), Status::kOk);
+  ASSERT_EQ(on_cpu.place(bodies.instances), Status::kOk);
+  ContactQuery here, there;
+  std::size_t contacts = 0;
+  for (int step = 0; step < 12; ++step) {
+    SCOPED_TRACE(testing::Message() << "step " << step);
+    for (std::uint32_t asset = 0; asset < 4; ++asset) {
+      const std::vector<float> now = bodies.bent(asset, test::kBends, random);
+      ASSERT_EQ(scene.deform(asset, now), Status::kOk);
+      ASSERT_EQ(on_cpu.deform(asset, now), Status::kOk);
+    }
+    ContactOptions asked[5];
+    asked[1].self_pairs = true;
+    asked[2].mode = QueryMode::fast;
+    asked[3].mode = QueryMode::boxes;
+    asked[4].within = 0.25;
+    for (const ContactOptions& options : asked) {
+      ASSERT_EQ(here.find(scene, options), Status::kOk);
+      ASSERT_EQ(there.find(on_cpu, options), Status::kOk);
+      EXPECT_TRUE(std::ranges::equal(here.pairs(), there.pairs()));
+      EXPECT_EQ(sorted(here), sorted(there));
+      contacts += here.rows().size();
+    }
+  }
+  EXPECT_GT(contacts, 10000u);
+}
+
+/// A scene on a GPU takes float64 numbers where float32 has them.
+TYPED_TEST_P(SceneOn, RefusesPositionsAndStaysAsItIs) {
+  RandomPoses random(33);
+  const BendingBodies bodies(random);
+  TypeParam scene;
+  Scene on_cpu;
+  Questions here, there;
+  ASSERT_EQ(scene.set_assets(bodies.views), Status::kOk);
+  ASSERT_EQ(on_cpu.set_assets(bodies.views), Status::kOk);
+  ASSERT_EQ(scene.place(bodies.instances), Status::kOk);
+  ASSERT_EQ(on_cpu.place(bodies.instances), Status::kOk);
+  constexpr test::Bend kTwist[] = {test::Bend::twist};
+  const std::vector<float> single = bodies.bent(1, kTwist, random);
+  std::vector<double> positions(single.begin(), single.end());
+  ASSERT_EQ(scene.deform(1, positions), Status::kOk);
+  ASSERT_EQ(on_cpu.deform(1, single), Status::kOk);
+  positions[10] = NAN;
+  EXPECT_EQ(scene.deform(1, positions), Status::kOutOfRange);
+  EXPECT_EQ(scene.where(), 3u);
+  EXPECT_EQ(scene.deform(7, single), Status::kUnknownAsset);
+  EXPECT_EQ(scene.deform(2, single), Status::kVertexCountMismatch);
+  if (!std::is_same_v<TypeParam, Scene>) {
+    positions[10] = 1.0 / 3;
+    EXPECT_EQ(scene.deform(1, positions), Status::kNotFloat32);
+    EXPECT_EQ(scene.where(), 3u);
+  }
+  here.of_verdicts = there.of_verdicts = Status::kDeformed;
+  here.ask(scene, 0.5, false, true);
+  there.ask(on_cpu, 0.5, false, true);
+  expect_same_answers(here, there);
+  // The files' shapes are there again.
+  ASSERT_EQ(scene.set_assets(bodies.views), Status::kOk);
+  ASSERT_EQ(on_cpu.set_assets(bodies.views), Status::kOk);
+  ASSERT_EQ(scene.place(bodies.instances), Status::kOk);
+  ASSERT_EQ(on_cpu.place(bodies.instances), Status::kOk);
+  here.of_verdicts = there.of_verdicts = Status::kOk;
+  here.ask(scene, 0.5, false, true);
+  there.ask(on_cpu, 0.5, false, true);
+  expect_same_answers(here, there);
+}
+
 REGISTER_TYPED_TEST_SUITE_P(SceneOn, FindsThePairsOfItsBodiesWhateverChanged,
                             FindsThePairsOfBodiesThatHardlyMove, RefusesListsOfDifferentLengths,
-                            AnswersManyQuestionsAboutTheSameBodies, AnswersOfNoBodiesAreEmpty);
+                            AnswersManyQuestionsAboutTheSameBodies, AnswersOfNoBodiesAreEmpty,
+                            AnswersQuestionsAboutBodiesThatBend, FindsContactsOfBodiesThatBendWildly,
+                            RefusesPositionsAndStaysAsItIs);
 
 }  // namespace tandem

@@ -34,7 +34,8 @@ class CudaContacts final : public GpuContactEngine {
             .first_contact_only = options_.first_contact_only,
             .sorted = order == OrderOnGpu::sorted,
             .grouped = order == OrderOnGpu::grouped,
-            .within = options_.within};
+            .within = options_.within,
+            .leave_out_rings = options_.leave_out_rings};
   }
 
   void name_shapes() override { name_shapes_to(query_); }
@@ -110,7 +111,8 @@ class CudaContacts final : public GpuContactEngine {
   }
 
   Seconds time_walk(const GpuPairs& pairs, std::uint32_t repeats) override {
-    const GpuContactOptions walk_alone = {.within = options_.within};
+    const GpuContactOptions walk_alone = {.within = options_.within,
+                                          .leave_out_rings = options_.leave_out_rings};
     GpuContactQuery walk;
     only_walk(walk, true);
     name_shapes_to(walk);

@@ -50,7 +50,7 @@ Read<GpuContactOptions> read_options(const tandem_gpu_query_options* given) {
   tandem_gpu_query_options read;
   if (const tandem_status status = read_struct(given, read); status != TANDEM_OK) return {status, {}};
   if (read.mode > TANDEM_BOXES || read.first_contact_only > 1 || read.sorted > 1 || read.grouped > 1 ||
-      read.add_error_bounds > 1 || read.reserved != 0)
+      read.add_error_bounds > 1)
     return {TANDEM_BAD_OPTION, {}};
   GpuContactOptions options;
   options.mode = static_cast<QueryMode>(read.mode);
@@ -60,6 +60,7 @@ Read<GpuContactOptions> read_options(const tandem_gpu_query_options* given) {
   options.add_error_bounds = read.add_error_bounds != 0;
   options.within = read.within;
   options.most_blocks = read.most_blocks;
+  options.leave_out_rings = read.leave_out_rings;
   return {TANDEM_OK, options};
 }
 

@@ -520,8 +520,9 @@ typedef struct tandem_contact_options {
   uint32_t first_contact_only;  ///< 1: one contact for each object pair that touches
   uint32_t self_pairs;          ///< 1: where the scene finds the pairs, also each body with itself
   uint32_t add_error_bounds;    ///< 1: a pair without a contact is surely apart at the finest levels too
-  uint32_t reserved;
-  double within;                    ///< clearance: triangles at most so far apart count, decided exactly
+  uint32_t leave_out_rings;     ///< of a body with itself: 0: all count; 1: triangles that share a vertex are
+                                ///< left out; n, at most 8: those that n - 1 edges join
+  double within;                ///< clearance: triangles at most so far apart count, decided exactly
   const tandem_object_pair* pairs;  ///< or null
   size_t pair_count;
 } tandem_contact_options;
@@ -540,7 +541,9 @@ typedef struct tandem_contact_counters {
 } tandem_contact_counters;
 
 /// Finds every pair of triangles that meet. A given pair of a body with itself asks for the contacts within
-/// it. Result: TANDEM_BAD_REACH where `within` is not from 0 to 1e300.
+/// it. Result: TANDEM_BAD_REACH where `within` is not from 0 to 1e300; TANDEM_BAD_OPTION where
+/// leave_out_rings is too large; TANDEM_NO_TOPOLOGY, where `where` is the asset of a body that meets itself
+/// and whose neighbours are to be left out.
 TANDEM_API tandem_status tandem_scene_find_contacts(tandem_scene* scene,
                                                     const tandem_contact_options* options);
 /// Returns the contacts by ascending pair, and within a pair in an order that is the same on every run and

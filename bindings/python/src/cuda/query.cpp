@@ -32,8 +32,8 @@ nb::object Query::rows_of(const FoundPairs& pairs, const Stream& stream) const {
 }
 
 nb::tuple Query::contacts(nb::object instances, nb::object given, std::uint32_t mode, bool first_contact_only,
-                          double within, bool add_error_bounds, bool sorted, bool grouped,
-                          const GpuFilter* filter, const Stream& stream) {
+                          double within, bool add_error_bounds, std::uint32_t leave_out_rings, bool sorted,
+                          bool grouped, const GpuFilter* filter, const Stream& stream) {
   const Turn turn(busy_, kBusy);
   const OnDevice current(device());
   const Instances& bodies = bodies_of(instances, device());
@@ -47,6 +47,7 @@ nb::tuple Query::contacts(nb::object instances, nb::object given, std::uint32_t 
   options.grouped = grouped;
   options.add_error_bounds = add_error_bounds;
   options.within = within;
+  options.leave_out_rings = leave_out_rings;
   const auto report = ContactQueries::run(contacts, [&](tandem_gpu_contact_query* query) {
     return tandem_gpu_contact_query_find(query, &bodies.get(), &pairs.pairs, &options, stream);
   });
@@ -193,7 +194,7 @@ void add_gpu_queries(nb::module_& module) {
   nb::class_<Query>(module, "Query")
       .def(nb::init<nb::object>())
       .def("contacts", &Query::contacts, nb::arg(), nb::arg().none(), nb::arg(), nb::arg(), nb::arg(),
-           nb::arg(), nb::arg(), nb::arg(), nb::arg().none(), nb::arg())
+           nb::arg(), nb::arg(), nb::arg(), nb::arg(), nb::arg().none(), nb::arg())
       .def("pairs", &Query::pairs, nb::arg(), nb::arg(), nb::arg(), nb::arg().none(), nb::arg())
       .def("manifolds", &Query::manifolds)
       .def("contained", &Query::contained)
@@ -204,7 +205,7 @@ void add_gpu_queries(nb::module_& module) {
       .def("verdicts", &Query::verdicts, nb::arg(), nb::arg(), nb::arg().none(), nb::arg().none(), nb::arg());
   nb::class_<Step>(module, "Step")
       .def(nb::init<nb::object, std::uint32_t, std::uint32_t, std::uint64_t, std::uint64_t, std::uint32_t,
-                    bool, double, bool, bool, bool>())
+                    bool, double, bool, std::uint32_t, bool, bool>())
       .def("enqueue", &Step::enqueue, nb::arg(), nb::arg().none(), nb::arg().none(), nb::arg())
       .def("pairs", &Step::pairs)
       .def("pair_count", &Step::pair_count)

@@ -94,8 +94,8 @@ class Query {
   explicit Query(nb::object assets) : assets_object_(assets), assets_(nb::cast<const Assets&>(assets)) {}
 
   nb::tuple contacts(nb::object instances, nb::object pairs, std::uint32_t mode, bool first_contact_only,
-                     double within, bool add_error_bounds, bool sorted, bool grouped, const GpuFilter* filter,
-                     const Stream& stream);
+                     double within, bool add_error_bounds, std::uint32_t leave_out_rings, bool sorted,
+                     bool grouped, const GpuFilter* filter, const Stream& stream);
   nb::object pairs(nb::object instances, bool sorted, double within, const GpuFilter* filter,
                    const Stream& stream);
   nb::tuple manifolds(std::uint32_t most_points, bool match_previous);
@@ -150,7 +150,7 @@ class Step {
  public:
   Step(nb::object assets, std::uint32_t instances, std::uint32_t pairs, std::uint64_t contacts,
        std::uint64_t undecided, std::uint32_t mode, bool first_contact_only, double within,
-       bool add_error_bounds, bool sorted, bool grouped);
+       bool add_error_bounds, std::uint32_t leave_out_rings, bool sorted, bool grouped);
   void enqueue(nb::object instances, nb::object pairs, nb::object filter, const Stream& stream);
   Rows pairs() const;
   Array pair_count() const;

@@ -4,7 +4,7 @@ namespace tandem::python {
 
 Step::Step(nb::object assets, std::uint32_t instances, std::uint32_t pairs, std::uint64_t contacts,
            std::uint64_t undecided, std::uint32_t mode, bool first_contact_only, double within,
-           bool add_error_bounds, bool sorted, bool grouped)
+           bool add_error_bounds, std::uint32_t leave_out_rings, bool sorted, bool grouped)
     : assets_object_(assets),
       assets_(nb::cast<const Assets&>(assets)),
       options_(sized<tandem_gpu_query_options>()),
@@ -14,6 +14,7 @@ Step::Step(nb::object assets, std::uint32_t instances, std::uint32_t pairs, std:
   options_.first_contact_only = first_contact_only;
   options_.within = near_.within = within;
   options_.add_error_bounds = add_error_bounds;
+  options_.leave_out_rings = leave_out_rings;
   options_.sorted = near_.sorted = sorted;
   options_.grouped = grouped;
   const OnDevice current(assets_.device());

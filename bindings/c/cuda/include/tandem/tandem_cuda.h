@@ -196,8 +196,8 @@ typedef struct tandem_gpu_query_options {
   uint32_t grouped;  ///< 1: contacts lie pair by pair, and groups() tells where
   uint32_t add_error_bounds;
   double within;
-  uint32_t most_blocks;  ///< thread blocks that look for contacts at a time; 0: as many as the GPU holds
-  uint32_t reserved;
+  uint32_t most_blocks;      ///< thread blocks that look for contacts at a time; 0: as many as the GPU holds
+  uint32_t leave_out_rings;  ///< as tandem_contact_options says; reserve() makes what it takes
 } tandem_gpu_query_options;
 
 typedef struct tandem_gpu_query_capacity {

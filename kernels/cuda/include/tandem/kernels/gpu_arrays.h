@@ -16,13 +16,20 @@ struct GpuAsset {
   TreeExtent extent;  ///< of the tree
   double origin[3];
   float lower[3], upper[3];
-  std::uint64_t source_faces;  ///< how many there are: contacts name faces below this number
+  std::uint64_t source_faces;     ///< how many there are: contacts name faces below this number
+  std::uint64_t source_vertices;  ///< how many positions the asset is deformed by
 };
 
 /// The asset that lies in GPU memory with level `level` of a file, which lies in CPU memory. on_gpu: as
 /// DeviceAssets::level() gives it. Condition: level < file.levels.size().
 inline GpuAsset gpu_asset(const LevelView& on_gpu, const AssetView& file, std::uint32_t level = 0) {
-  GpuAsset asset = {on_gpu, extent_of(file.level(level).blocks[0]), {}, {}, {}, file.header->source_faces};
+  GpuAsset asset = {on_gpu,
+                    extent_of(file.level(level).blocks[0]),
+                    {},
+                    {},
+                    {},
+                    file.header->source_faces,
+                    file.header->source_vertices};
   std::copy_n(file.header->origin, 3, asset.origin);
   std::copy_n(file.header->lower, 3, asset.lower);
   std::copy_n(file.header->upper, 3, asset.upper);
@@ -40,6 +47,14 @@ inline AssetBounds asset_bounds(const FileHeader& header) {
   std::copy_n(header.origin, 3, bounds.origin);
   std::copy_n(header.lower, 3, bounds.lower);
   std::copy_n(header.upper, 3, bounds.upper);
+  return bounds;
+}
+
+inline AssetBounds asset_bounds(const GpuAsset& asset) {
+  AssetBounds bounds = {};
+  std::copy_n(asset.origin, 3, bounds.origin);
+  std::copy_n(asset.lower, 3, bounds.lower);
+  std::copy_n(asset.upper, 3, bounds.upper);
   return bounds;
 }
 

@@ -34,6 +34,10 @@ struct GpuContactOptions {
   /// Levels of detail: as ContactOptions::add_error_bounds says. Object pairs are found as without.
   bool add_error_bounds = false;
 
+  /// Rings of neighbours that are left out of pairs of an instance with itself, as
+  /// ContactOptions::leave_out_rings says.
+  std::uint32_t leave_out_rings = 0;
+
   /// Returns whether distances are asked for at all, which takes other kernels, and more memory.
   constexpr bool of_clearance() const { return within > 0 || add_error_bounds; }
 };
@@ -50,7 +54,8 @@ inline constexpr std::size_t kMostWideBytes = std::size_t{2} << 20;
 
 /// GPU memory that a query of so many assets with room for so much holds at most: the bound of
 /// GpuContactQuery::bytes(), where it was never given more of them. options: those of all its calls.
-/// Instances cost it nothing, nor does the size of the assets.
+/// Instances cost it nothing, nor does the size of the assets, unless neighbours are left out: then 24 bytes
+/// for each asset and the lists that ContactOptions::leave_out_rings speaks of come on top.
 constexpr std::size_t most_query_bytes(const GpuContactCapacity& capacity, const GpuContactOptions& options,
                                        std::size_t assets) {
   constexpr std::size_t kFixed = std::size_t{9} << 20;  // work that warps give to each other, and the report
@@ -84,7 +89,7 @@ struct GpuContactGroups {
 struct GpuContactReport {
   Status status;              ///< kOk, or what a scene or ContactQuery names; then no contacts
   std::uint32_t complete;     ///< 0 where something did not fit: contacts are missing then, see `needed`
-  std::uint64_t where;        ///< the instance or pair that caused an error
+  std::uint64_t where;        ///< the instance, pair or asset that caused an error
   GpuContactCapacity needed;  ///< a lower bound; exact for what follows from things that did fit
   std::uint64_t contacts;     ///< how many are stored
   std::uint64_t world_pairs;  ///< object pairs beyond float32, which are walked by world boxes, slowly
@@ -98,14 +103,19 @@ extern template class GpuAssetQuestion<GpuContactCapacity, GpuContactReport, Gpu
 /// of contacts as ContactQuery. See GpuQuestion.
 ///
 /// set_assets() also returns kOutOfRange for a tree of 2^29 - 1 blocks or more. reserve() makes room for
-/// clearance where `within` or add_error_bounds is set; it also returns kOutOfRange (sorted or grouped: 2^32
-/// - 1 contacts or more; grouped: 2^31 pairs or more). bytes() is at most most_query_bytes().
+/// clearance where `within` or add_error_bounds is set, and the lists of neighbours for leave_out_rings: the
+/// CPU makes them, of all assets, where the last call was for another number; it also returns kOutOfRange
+/// (sorted or grouped: 2^32 - 1 contacts or more; grouped: 2^31 pairs or more). bytes() is at most
+/// most_query_bytes().
 class GpuContactQuery : public GpuAssetQuestion<GpuContactCapacity, GpuContactReport, GpuContactOptions> {
  public:
   /// Queues a query behind what `stream` holds. A pair of an instance with itself asks for the contacts
   /// within it. Mode exact walks oriented blocks, the others axis-aligned ones. Result: also
-  /// kNoOrientedBlocks or kNoAxisAlignedBlocks (an asset lacks them), kOutOfRange (sorted, grouped or of
-  /// clearance, and reserved without), kBadReach (`within`). Condition: set_assets() and reserve().
+  /// kNoOrientedBlocks or kNoAxisAlignedBlocks (an asset lacks them), kOutOfRange (sorted, grouped, of
+  /// clearance or leaving out rings, and reserved without), kBadReach (`within`), kBadOption
+  /// (leave_out_rings). The report also names kNoTopology, where `where` is an asset that has none on
+  /// the GPU and whose neighbours are to be left out. Condition:
+  /// set_assets() and reserve().
   Status enqueue(const GpuInstances& instances, const GpuPairs& pairs, const GpuContactOptions& options,
                  cudaStream_t stream);
 

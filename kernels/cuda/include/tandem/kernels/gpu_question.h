@@ -73,6 +73,12 @@ class GpuAssetQuestion : public GpuQuestion<Capacity, Report, Options> {
   /// question asks for; kOutOfRange (2^32 - 1 assets); kOutOfGpuMemory, kOutOfMemory, or another that
   /// status_of() of gpu_status.h names: kNoGpu, kDriverTooOld, kGpuNotSupported, kCudaFailed.
   Status set_assets(std::span<const GpuAsset> assets, cudaStream_t stream);
+
+  /// Says that assets deform: calls to come take what is to be known of them from these records of the list,
+  /// in GPU memory, as a GpuDeformer writes them there. Null, as after set_assets(): they take what
+  /// set_assets() was given. Result: kOk, or kDeformed where the question is not offered for deformed assets.
+  /// Condition: set_assets().
+  Status follow(const GpuAsset* records);
 };
 
 }  // namespace tandem

@@ -409,8 +409,9 @@ TANDEM_API tandem_status tandem_scene_deform_f64(tandem_scene* scene, uint32_t a
                                                  size_t vertex_count);
 
 /// How much looser the tree of a deformed asset is than as it was built: its inner boxes' surface by that of
-/// its leaves' boxes, divided by the same of the file's tree. Queries cost about so much more. Above 1.5 or 2
-/// an asset built anew of the positions pays soon. 1 where the asset is not deformed, or there is none.
+/// its leaves' boxes, divided by the same of the file's tree. 2 and more tells that triangles
+/// were scattered, and that an asset built anew of the positions pays. 1 where the asset is not deformed, or
+/// there is none.
 TANDEM_API double tandem_scene_looseness(const tandem_scene* scene, uint32_t asset);
 
 /// Places all bodies anew; those that stand as before cost next to nothing. filter: or null. Result:

@@ -82,9 +82,9 @@ class Scene {
   Status deform(std::uint32_t asset, std::span<const double> positions);
 
   /// Says how much looser the tree of a deformed asset is than as it was built: its inner boxes' surface by
-  /// that of its leaves' boxes, divided by the same of the file's tree. Queries cost about so much more.
-  /// Above 1.5 or 2 a new tree (tandem::build()) of the positions pays soon. 1 where the asset is not
-  /// deformed.
+  /// that of its leaves' boxes, divided by the same of the file's tree. 2 and more tells
+  /// that triangles were scattered, and that a new tree (tandem::build()) of the positions pays. 1 where the
+  /// asset is not deformed.
   double looseness(std::uint32_t asset) const;
 
   /// Places all bodies anew; those that stand as before cost next to nothing. The scene copies the arrays of

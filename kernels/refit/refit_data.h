@@ -51,7 +51,7 @@ struct DeformArgs {
   GpuAssetRecords records;
   std::uint32_t body_count;
   std::uint32_t rounds;
-  std::uint32_t work_end[kMostRounds + 1];  ///< of the checks, then of each round
+  std::uint32_t work_end[kMostRefitRounds + 1];  ///< of the checks, then of each round
   DeformState* state;
   GpuDeformReport* host_report;  ///< in CPU memory
   DeviceLimits limits;

@@ -17,7 +17,6 @@ struct PlanNode {
   std::uint32_t slot;    ///< in its cluster
   std::uint32_t root = kNoIndex;
   std::uint32_t oriented = kNoIndex, first_below = 0;
-  BlockRotation rotation = kNoRotation;
 };
 
 /// An oriented block that waits to be numbered, and where its number goes.
@@ -97,7 +96,6 @@ class PlanMaker {
       node.count = real_nodes(block);
       node.oriented = next.oriented;
       node.first_below = block.first_below;
-      node.rotation = block.rotation;
       for (int i = node.count; i-- > 0;) {
         const auto step = static_cast<std::uint32_t>(i);
         if (node.is_leaf_block) node.below[i] = (block.first_below & ~OrientedBlock::kIsLeafBlock) + step;
@@ -197,7 +195,7 @@ class PlanMaker {
     std::uint32_t next_input = 0;
     for (const std::uint32_t b : members_.view()) {
       const PlanNode& node = nodes_[b];
-      RefitBlock block = {b, node.oriented, node.first_below, node.root, {}, node.rotation};
+      RefitBlock block = {b, node.oriented, node.first_below, node.root, {}};
       std::fill_n(block.below, kNodesPerBlock, RefitBlock::kNothing);
       for (int i = 0; i < node.count; ++i) {
         std::uint32_t below = next_input;

@@ -16,7 +16,7 @@ inline constexpr std::uint32_t kMostClusterBlocks = 128, kMostInputs = kNodesPer
 /// A block with more than kMostClusterBlocks blocks below it, which waits for a later round, is one of at
 /// most 64 (kMaxDepth) for every kMostClusterBlocks blocks. So each round leaves at most half of the blocks,
 /// and of fewer than 2^32 none is left after 32 rounds.
-inline constexpr std::uint32_t kMostRounds = 32;
+inline constexpr std::uint32_t kMostRefitRounds = 32;
 
 /// The source vertex of a triangle's corner, and what the triangle says beside the position.
 struct alignas(8) CornerSource {
@@ -34,9 +34,8 @@ struct alignas(16) RefitBlock {
   /// What is below each node: a triangle of the cluster, or a box of the cluster; boxes are numbered inputs
   /// first, then blocks. kNothing: the node is imaginary.
   std::uint16_t below[kNodesPerBlock];
-  BlockRotation rotation;  ///< of the oriented block at rest
 };
-static_assert(sizeof(RefitBlock) == 32);
+static_assert(sizeof(RefitBlock) == 32);  // with what alignment leaves
 
 struct RefitCluster {
   std::uint32_t first_block, blocks;  ///< in RefitPlans::blocks, children before parents
@@ -50,7 +49,7 @@ struct RefitPlan {
   std::uint64_t first_corner;  ///< in RefitPlans::corners
   std::uint32_t roots;         ///< how many boxes go from round to round
   std::uint32_t rounds;
-  std::uint32_t first_cluster[kMostRounds + 1];  ///< of each round, in RefitPlans::clusters, and the end
+  std::uint32_t first_cluster[kMostRefitRounds + 1];  ///< of each round, in RefitPlans::clusters, and the end
 };
 
 /// The plans of some trees, one behind the other.

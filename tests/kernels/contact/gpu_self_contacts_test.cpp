@@ -75,6 +75,16 @@ TEST_P(GpuSelfContacts, HaveAFirstOneThatIsNotLeftOut) {
   }
 }
 
+/// Contacts of instances with themselves, whose triangles may come in either order.
+std::vector<Contact> lower_first(std::vector<Contact> contacts) {
+  for (Contact& contact : contacts) {
+    if (contact.triangle_a <= contact.triangle_b) continue;
+    std::swap(contact.triangle_a, contact.triangle_b);
+    std::swap(contact.face_a, contact.face_b);
+  }
+  return test::sorted(contacts);
+}
+
 /// One query keeps its lists from call to call, and makes others for another number of rings.
 TEST_P(GpuSelfContacts, FollowTheRingsOfTheCall) {
   const BodyScene scene = scene_of(GetParam());
@@ -83,7 +93,9 @@ TEST_P(GpuSelfContacts, FollowTheRingsOfTheCall) {
     GpuContactOptions options = leaving_out(rings);
     options.sorted = options.grouped = true;
     ASSERT_EQ(gpu.find(options), Status::kOk);
-    EXPECT_EQ(gpu.contacts(), ask_cpu(scene, kPairs, {.leave_out_rings = rings}).contacts) << rings;
+    EXPECT_EQ(lower_first(gpu.contacts()),
+              lower_first(ask_cpu(scene, kPairs, {.leave_out_rings = rings}).contacts))
+        << rings;
   }
 }
 
@@ -183,8 +195,8 @@ TEST_F(GpuNeighbours, AreLeftOutByScenes) {
     const ContactOptions options = {.self_pairs = true, .leave_out_rings = rings};
     ASSERT_EQ(of_cpu.find(cpu, options), Status::kOk);
     ASSERT_EQ(of_gpu.find(gpu, options), Status::kOk);
-    EXPECT_EQ(test::sorted({of_gpu.rows().begin(), of_gpu.rows().end()}),
-              test::sorted({of_cpu.rows().begin(), of_cpu.rows().end()}));
+    EXPECT_EQ(lower_first({of_gpu.rows().begin(), of_gpu.rows().end()}),
+              lower_first({of_cpu.rows().begin(), of_cpu.rows().end()}));
   }
 }
 

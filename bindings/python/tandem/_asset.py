@@ -264,7 +264,7 @@ class Asset(NotNumbers):
         return {"version": f"{major}.{minor}", "hash": self.hash, "bytes": self.file_bytes, **dict(zip(_TREE, tree)), **dict(zip(_WORK, measured[0][1])),
                 "surface": None if surface is None else dict(zip(_SURFACE, surface)),
                 "bounds": {"lower": list(lower), "upper": list(upper)}, "origin": list(self._info.origin), "rounding_error": self.rounding_error,
-                "source_faces": self.source_faces, "source_vertices": self.source_vertices, "source": self.provenance, "parts": [part._asdict() for part in self.parts], "levels": levels,
+                "source_faces": self.source_faces, "source_vertices": self.source_vertices or None, "source": self.provenance, "parts": [part._asdict() for part in self.parts], "levels": levels,
                 "sections": sections}
 
 

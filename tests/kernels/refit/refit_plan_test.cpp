@@ -165,7 +165,7 @@ TEST(RefitPlan, RefitsEveryTreeAsTheCpuDoes) {
     files.push_back(std::make_unique<Bytes>(make_refittable_file(welded(mesh))));
   };
   for (const std::uint32_t count : {1u, 2u, 5u, 17u, 400u, 600u, 3000u}) add(random_mesh(count, count));
-  add(cube(0.5f, 60));
+  add(cube(0.5f, 110));
   expect_right_plans(files, 3);
 }
 

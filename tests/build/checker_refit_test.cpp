@@ -60,7 +60,8 @@ TEST(CheckRefit, AcceptsTheSampleAndShowsBothSections) {
     for (std::uint32_t k = 0; k < 3; ++k)
       EXPECT_EQ(level.source_vertices[level.topology[t].vertex[k]], 3 * level.triangles[t].source_face() + k);
   }
-  const CheckResult without = sample().check();
+  const Bytes plain = sample();
+  const CheckResult without = plain.check();
   EXPECT_EQ(without.asset.header->source_vertices, 0u);
   EXPECT_EQ(without.asset.level().source_vertices, nullptr);
   EXPECT_EQ(without.asset.level().block_order, nullptr);
@@ -113,8 +114,8 @@ TEST(CheckRefit, TwoVerticesMayLieAtOnePositionOnlyWhereTheyHaveSourceVertices) 
   EXPECT_EQ(touching(false, false).check().status, kOk);
   EXPECT_EQ(touching(true, true).check().status, kOk);
   EXPECT_EQ(touching(true, false).check().status, kVertexMismatch);
-  const CheckResult apart = touching(true, true).check();
-  EXPECT_EQ(apart.asset.level().vertex_count, 6u);
+  const Bytes file = touching(true, true);
+  EXPECT_EQ(file.check().asset.level().vertex_count, 6u);
 }
 
 TEST(CheckRefit, CornersOfOneVertexLieAtOnePositionEverywhere) {

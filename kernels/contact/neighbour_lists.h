@@ -60,7 +60,7 @@ class BodyNeighbours {
   /// kOutOfMemory, where where() of the scene is the asset.
   Status provide(SceneState& scene, std::span<const ObjectPair> pairs, std::uint32_t rings);
 
-  /// By the bodies' numbers; anything for a body that is not paired with itself.
+  /// They are listed by the bodies' numbers; a body that is not paired with itself may have any.
   std::span<const Neighbourhood> view() const { return of_body_.view(); }
 
  private:

@@ -26,7 +26,7 @@ class RebuiltShape {
     return view().level().triangles[triangle].source_face();
   }
 
-  /// For each triangle of the shape whether the new tree has it.
+  /// This says of each triangle of the shape whether the new tree has it.
   std::vector<bool> kept() const;
 
  private:

@@ -39,8 +39,8 @@ struct VertexRun {
   std::vector<Point> base;
   std::vector<std::vector<Point>> targets;     ///< differences from the base, for each morph target
   std::vector<std::uint32_t> influence_begin;  ///< of each vertex, and the end; empty without a skin
-  /// By joint, so that vertices with the same influences are moved to the same place to the last bit, in
-  /// whatever order the file has them.
+  /// Those of a vertex are sorted by joint, so that vertices with the same influences are moved to the same
+  /// place to the last bit, in whatever order the file has them.
   std::vector<Influence> influences;
 };
 

@@ -31,7 +31,8 @@ struct PolygonMesh {
   std::vector<std::uint32_t> corners;        ///< vertex indices of all faces, one face after the other
   std::vector<std::uint32_t> face_begin{0};  ///< face f has corners [face_begin[f], face_begin[f + 1])
   std::vector<SourcePart> parts;             ///< ascending, without gaps, together all faces
-  /// Where the points are in other samples of an animation: finite and at most kMaxCoordinate in magnitude.
+  /// These say where the points are in other samples of an animation. They are finite and at most
+  /// kMaxCoordinate in magnitude.
   std::vector<std::vector<Point>> poses{};
   LeftOut left_out;
   std::string reader;             ///< who read the file, for the report: "tandem PLY", "assimp 5.2.5"
@@ -53,7 +54,8 @@ struct TriangleMesh {
   std::vector<std::uint32_t> face;  ///< of each triangle: the face of the file that it is a piece of
   /// Of each point: the vertex of the file, ascending. Empty: point i is vertex i.
   std::vector<std::uint32_t> source_vertex{};
-  /// Where the points are in other samples of an animation: finite and at most kMaxCoordinate in magnitude.
+  /// These say where the points are in other samples of an animation. They are finite and at most
+  /// kMaxCoordinate in magnitude.
   std::vector<std::vector<Point>> poses{};
 };
 

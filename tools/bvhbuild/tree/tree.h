@@ -62,7 +62,7 @@ Tree build_tree(const Geometry& geometry, Imaginary imaginary = Imaginary::minim
                 Effort effort = Effort::standard);
 Tree build_tree(const Geometry& geometry, Imaginary imaginary, Effort effort, OptimisationWatch& watch);
 
-/// The same tree over the same triangles where the geometry's points have them: its boxes are made anew.
+/// Returns the tree with its boxes made anew, around the triangles where the geometry's points have them.
 Tree refitted(const Geometry& geometry, const Tree& tree);
 
 /// The number of the block that each oriented block belongs to (tandem/formats/oriented_block.h says how they

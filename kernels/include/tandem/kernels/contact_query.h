@@ -54,8 +54,8 @@ struct ContactOptions {
 struct ContactCounters {
   std::uint64_t object_pairs = 0;
   std::uint64_t block_pairs = 0;  ///< 16 box tests each
-  /// Without neighbours that are left out; except in boxes mode, without those that planes of leaves tell
-  /// apart.
+  /// Neighbours that are left out do not count, nor, except in boxes mode, do triangles that planes of leaves
+  /// tell apart.
   std::uint64_t candidates = 0;
   std::uint64_t decided_by_float32 = 0;  ///< candidates, by the stage of the cascade that decided
   std::uint64_t decided_by_float64 = 0;

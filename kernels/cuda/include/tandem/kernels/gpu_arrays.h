@@ -42,19 +42,13 @@ struct AssetBounds {
   float lower[3], upper[3];
 };
 
-inline AssetBounds asset_bounds(const FileHeader& header) {
+/// The bounds that a file's header or a GpuAsset has.
+template <typename Bounded>
+AssetBounds asset_bounds(const Bounded& of) {
   AssetBounds bounds = {};
-  std::copy_n(header.origin, 3, bounds.origin);
-  std::copy_n(header.lower, 3, bounds.lower);
-  std::copy_n(header.upper, 3, bounds.upper);
-  return bounds;
-}
-
-inline AssetBounds asset_bounds(const GpuAsset& asset) {
-  AssetBounds bounds = {};
-  std::copy_n(asset.origin, 3, bounds.origin);
-  std::copy_n(asset.lower, 3, bounds.lower);
-  std::copy_n(asset.upper, 3, bounds.upper);
+  std::copy_n(of.origin, 3, bounds.origin);
+  std::copy_n(of.lower, 3, bounds.lower);
+  std::copy_n(of.upper, 3, bounds.upper);
   return bounds;
 }
 

@@ -20,8 +20,8 @@ struct TriangleSource {
   std::uint64_t face_count = 0;         ///< more than every face; where `face` is empty, of the triangles
   std::span<const SourcePart>
       parts;  ///< ascending, without gaps, together all faces; empty: one without a name
-  /// Where the points are in other samples of an animation; the tree is made for the mean over all of them.
-  /// Each has as many rows as `points`, finite and at most kMaxCoordinate in magnitude. At most
+  /// These say where the points are in other samples of an animation; the tree is made for the mean over all
+  /// of them. Each has as many rows as `points`, finite and at most kMaxCoordinate in magnitude. At most
   /// kMostTreeSamples samples, the points' own among them, count for the tree, spread evenly.
   std::span<const std::vector<Point>> poses{};
 };

@@ -25,7 +25,7 @@ class World::State {
 
 struct World::Parts {
   std::vector<AssetView> assets;
-  std::vector<std::uint32_t> group, mask;
+  std::vector<std::uint32_t> group, mask, world;
   std::vector<ObjectPair> excluded;  // by the caller
   ExcludedPairTable apart;           // these, and those that joints keep from touching
   PairFilter filter;                 // of the above; the simulation looks at it
@@ -181,7 +181,7 @@ Status World::set_bodies(std::span<const BodyDescription> bodies, const WorldOpt
     Masses masses(parts.assets);
     std::vector<BodyProperties> all(bodies.size());
     std::vector<BodyState> states(bodies.size());
-    parts.group.clear(), parts.mask.clear();
+    parts.group.clear(), parts.mask.clear(), parts.world.clear();
     for (std::size_t i = 0; i < bodies.size(); ++i) {
       const BodyDescription& from = bodies[i];
       if (from.asset >= parts.assets.size()) return fail(Status::kUnknownAsset, i);
@@ -196,6 +196,7 @@ Status World::set_bodies(std::span<const BodyDescription> bodies, const WorldOpt
       }
       if (!is_usable(all[i]) || !is_usable(states[i])) return fail(Status::kOutOfRange, i);
       parts.group.push_back(from.filter.group), parts.mask.push_back(from.filter.mask);
+      parts.world.push_back(from.filter.world);
     }
     std::vector<Joint> joined;
     for (std::size_t i = 0; i < joints.size(); ++i) {
@@ -252,7 +253,8 @@ Status World::Parts::filter_pairs(std::span<const Joint> joined) {
   const Status status = table.set(pairs);
   if (status != Status::kOk) return status;
   apart = std::move(table);
-  filter = {nullptr, group.data(), mask.data(), apart.view()};
+  const bool one_world = std::ranges::all_of(world, [](std::uint32_t w) { return w == kEveryWorld; });
+  filter = {nullptr, group.data(), mask.data(), one_world ? nullptr : world.data(), apart.view()};
   return Status::kOk;
 }
 

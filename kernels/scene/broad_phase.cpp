@@ -4,6 +4,7 @@
 #include <atomic>
 #include <limits>
 #include <new>
+#include <tuple>
 #include <type_traits>
 #include <utility>
 
@@ -34,7 +35,8 @@ std::uint32_t next_of(std::uint32_t& value, std::uint32_t workers) {
 }
 
 bool tells_apart(const PairFilter& filter) {
-  return filter.motion != nullptr || filter.group != nullptr || filter.mask != nullptr;
+  return filter.motion != nullptr || filter.group != nullptr || filter.mask != nullptr ||
+         filter.world != nullptr;
 }
 
 // The motions that meet one; a bit for each.
@@ -60,7 +62,27 @@ bool BroadPhase::Tree::reserve(std::size_t boxes, const PairFilter& filter) {
 BroadPhase::Kind BroadPhase::kind_of(const PairFilter& filter, std::size_t box) {
   const Motion motion = filter.motion != nullptr ? filter.motion[box] : Motion::moving;
   return {filter.group != nullptr ? filter.group[box] : ~0u, filter.mask != nullptr ? filter.mask[box] : ~0u,
-          1u << (static_cast<std::uint32_t>(motion) & 3), motions_that_meet(motion)};
+          1u << (static_cast<std::uint32_t>(motion) & 3), motions_that_meet(motion),
+          WorldRange::of(filter.world != nullptr ? filter.world[box] : 0)};
+}
+
+// Of boxes of one world.
+bool BroadPhase::Kind::before(const Kind& other) const {
+  const auto order = [](const Kind& k) { return std::tie(k.group, k.mask, k.motions, k.met); };
+  return order(*this) < order(other);
+}
+
+void BroadPhase::Kind::add(const Kind& more) {
+  group |= more.group;
+  mask |= more.mask;
+  motions |= more.motions;
+  met |= more.met;
+  worlds.add(more.worlds);
+}
+
+bool BroadPhase::Kind::may_look_at(const Kind& other) const {
+  return (met & other.motions) != 0 && groups_meet(group, mask, other.group, other.mask) &&
+         worlds.meets(other.worlds);
 }
 
 // One for each worker, with nothing found.
@@ -79,7 +101,8 @@ bool BroadPhase::provide_finders(std::uint32_t workers) {
 }
 
 // The tree's items, in the order of `numbers`, or of boxes where it is null. False: a box is out of range.
-bool BroadPhase::take(std::span<const WorldBox> boxes, const std::uint32_t* numbers, Tree& tree, Team team) {
+bool BroadPhase::take(std::span<const WorldBox> boxes, const std::uint32_t* world,
+                      const std::uint32_t* numbers, Tree& tree, Team team) {
   std::atomic<bool> all_in_range = true;
   Item* const items = tree.items.data();
   team.threads.for_parts(team.workers, tree.items.size(), kBoxesAtOnce,
@@ -91,14 +114,16 @@ bool BroadPhase::take(std::span<const WorldBox> boxes, const std::uint32_t* numb
                              for (int k = 0; k < 3; ++k)
                                items[i].centre[k] = 0.5 * boxes[b].lo[k] + 0.5 * boxes[b].hi[k];
                              items[i].box = static_cast<std::uint32_t>(b);
+                             items[i].world = world != nullptr ? world[b] : 0;
                            }
                            if (!in) all_in_range.store(false, std::memory_order_relaxed);
                          });
   return all_in_range;
 }
 
-// Splits a range at the median along its longest extent: `range` keeps the left half. Where all centres are
-// one, instances that the filter treats alike stay together. False: there is nothing to split.
+// Splits a range at the median: by world where it has several, else along its longest extent. `range` keeps
+// the left half. Where all centres are one, instances that the filter treats alike stay together. False:
+// there is nothing to split.
 bool BroadPhase::halve(Item* all, const PairFilter& filter, Range& range, Range& right) {
   if (range.count <= 1) return false;
   while (range.units == 1) {
@@ -109,7 +134,9 @@ bool BroadPhase::halve(Item* all, const PairFilter& filter, Range& range, Range&
   Item* const items = all + range.begin;
   const std::size_t count = range.count;
   double lo[3] = {kInfinity, kInfinity, kInfinity}, hi[3] = {-kInfinity, -kInfinity, -kInfinity};
+  bool one_world = true;
   for (std::size_t i = 0; i < count; ++i) {
+    one_world = one_world && items[i].world == items[0].world;
     for (int k = 0; k < 3; ++k) {
       const double c = items[i].centre[k];
       lo[k] = c < lo[k] ? c : lo[k];
@@ -121,9 +148,12 @@ bool BroadPhase::halve(Item* all, const PairFilter& filter, Range& range, Range&
     if (hi[k] - lo[k] > hi[axis] - lo[axis]) axis = k;
   }
   const std::size_t left_units = (range.units + 1) / 2, left = left_units * range.unit;
-  if (tells_apart(filter) && !(hi[axis] > lo[axis])) {
+  if (!one_world) {
+    std::nth_element(items, items + left, items + count,
+                     [](const Item& x, const Item& y) { return x.world < y.world; });
+  } else if (tells_apart(filter) && !(hi[axis] > lo[axis])) {
     std::nth_element(items, items + left, items + count, [&](const Item& x, const Item& y) {
-      return kind_of(filter, x.box) < kind_of(filter, y.box);
+      return kind_of(filter, x.box).before(kind_of(filter, y.box));
     });
   } else {
     std::nth_element(items, items + left, items + count,
@@ -203,12 +233,7 @@ void BroadPhase::build_kinds(int level, std::size_t below, const PairFilter& fil
       Kind kind;
       if (i < below && level == 0) kind = kind_of(filter, tree.items[i].box);
       if (i < below && level > 0) {
-        for (const Kind& child : tree.kinds[tree.level_begin[level - 1] + i].of) {
-          kind.group |= child.group;
-          kind.mask |= child.mask;
-          kind.motions |= child.motions;
-          kind.met |= child.met;
-        }
+        for (const Kind& child : tree.kinds[tree.level_begin[level - 1] + i].of) kind.add(child);
       }
       tree.kinds[tree.level_begin[level] + i / kGroup].of[i % kGroup] = kind;
     }
@@ -249,18 +274,19 @@ std::uint32_t BroadPhase::meeting(const TreePair& trees, const GroupPair& pair) 
 }
 
 // Finds what meets of a pair of groups, where the filter may look at a pair below: if it looks at x and y, it
-// does at anything that has all of their groups, masks and motions, and more. Of kept boxes no more is known
-// than that they are fixed, as the filter may differ from call to call. Pairs of boxes are asked about by
-// themselves.
+// does at anything that has all of their groups, masks, motions and worlds, and more. Of kept boxes no more
+// is known than that they are fixed and in which world, as the filter may differ from call to call. Pairs of
+// boxes are asked about by themselves.
 std::uint32_t BroadPhase::may_look(const TreePair& trees, const GroupPair& pair) {
   std::uint32_t mask = meeting(trees, pair);
-  constexpr Kind kFixed = {~0u, ~0u, 1u << static_cast<std::uint32_t>(Motion::fixed), 0};
+  constexpr Kind kFixed = {~0u, ~0u, 1u << static_cast<std::uint32_t>(Motion::fixed), 0, {0, kEveryWorld}};
   if (pair.level == 0 || trees.a.kinds.size() == 0 || pair.level > trees.a.top()) return mask;
-  const Kinds* const kinds = trees.a.kinds.data() + trees.a.level_begin[pair.level];
+  const bool b_is_known = trees.b.kinds.size() != 0 && pair.level <= trees.b.top();
   for (std::uint32_t left = mask; left != 0; left &= left - 1) {
     const int bit = lowest_bit(left);
-    const Kind &a = kinds[pair.a].of[bit / 4], &b = trees.same() ? kinds[pair.b].of[bit % 4] : kFixed;
-    if ((a.met & b.motions) == 0 || !groups_meet(a.group, a.mask, b.group, b.mask)) mask &= ~(1u << bit);
+    const Kind& a = trees.a.kinds_of(pair.level)[pair.a].of[bit / 4];
+    const Kind& b = b_is_known ? trees.b.kinds_of(pair.level)[pair.b].of[bit % 4] : kFixed;
+    if (!a.may_look_at(b)) mask &= ~(1u << bit);
   }
   return mask;
 }
@@ -394,7 +420,8 @@ Status BroadPhase::find_pairs(std::span<const WorldBox> boxes, const PairFilter&
   if (filter.excluded.instances > boxes.size()) return Status::kUnknownInstance;
   const std::size_t count = free_count(boxes.size());
   if (!tree_.reserve(count, filter) || !provide_finders(workers)) return Status::kOutOfMemory;
-  if (!take(boxes, kept_of_ != 0 ? free_.data() : nullptr, tree_, team)) return Status::kOutOfRange;
+  if (!take(boxes, filter.world, kept_of_ != 0 ? free_.data() : nullptr, tree_, team))
+    return Status::kOutOfRange;
   if (count == 0) return Status::kOk;
   build(boxes, filter, tree_, team);
   if (!collect({tree_, tree_}, filter, team)) return Status::kOutOfMemory;
@@ -403,14 +430,15 @@ Status BroadPhase::find_pairs(std::span<const WorldBox> boxes, const PairFilter&
   return sort_pairs(boxes.size(), team);
 }
 
-Status BroadPhase::keep_fixed(std::span<const WorldBox> boxes, std::span<const Motion> motion) {
+Status BroadPhase::keep_fixed(std::span<const WorldBox> boxes, std::span<const Motion> motion,
+                              const std::uint32_t* world) {
   WorkerThreads none;
-  return keep_fixed(boxes, motion, none, 1);
+  return keep_fixed(boxes, motion, world, none, 1);
 }
 
 // Where none of the boxes is fixed, none are kept.
 Status BroadPhase::keep_fixed(std::span<const WorldBox> boxes, std::span<const Motion> motion,
-                              WorkerThreads& threads, std::uint32_t workers) {
+                              const std::uint32_t* world, WorkerThreads& threads, std::uint32_t workers) {
   const Team team = {threads, workers};
   forget_fixed();
   pairs_.clear();
@@ -418,7 +446,9 @@ Status BroadPhase::keep_fixed(std::span<const WorldBox> boxes, std::span<const M
   if (boxes.size() >= kNoIndex) return Status::kTooManyInstances;
   if (boxes.size() != motion.size()) return Status::kKeptMismatch;
   const auto fixed = static_cast<std::size_t>(std::count(motion.begin(), motion.end(), Motion::fixed));
-  if (!free_.resize(boxes.size() - fixed) || !fixed_.resize(fixed) || !kept_.reserve(fixed, {}))
+  // Where there is one world, the kept boxes have nothing that tells them apart.
+  const PairFilter kinds = {.motion = world != nullptr ? motion.data() : nullptr, .world = world};
+  if (!free_.resize(boxes.size() - fixed) || !fixed_.resize(fixed) || !kept_.reserve(fixed, kinds))
     return Status::kOutOfMemory;
   std::size_t free_now = 0, fixed_now = 0;
   for (std::uint32_t b = 0; b < boxes.size(); ++b) {
@@ -428,9 +458,9 @@ Status BroadPhase::keep_fixed(std::span<const WorldBox> boxes, std::span<const M
       free_[free_now++] = b;
     }
   }
-  if (!take(boxes, fixed_.data(), kept_, team)) return Status::kOutOfRange;
+  if (!take(boxes, world, fixed_.data(), kept_, team)) return Status::kOutOfRange;
   if (fixed == 0) return Status::kOk;
-  build(boxes, {}, kept_, team);
+  build(boxes, kinds, kept_, team);
   kept_of_ = boxes.size();
   return Status::kOk;
 }

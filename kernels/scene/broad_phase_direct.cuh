@@ -90,6 +90,7 @@ class Direct {
         node.lo[k] = static_cast<float>(box.lo[k] - origin);
         node.hi[k] = static_cast<float>(box.hi[k] - origin);
       }
+      if (rule_.worlds() != nullptr) node.last = rule_.worlds()[boxes_.number(i)];
     }
     tiles_.exact[side][threadIdx.x % kTile] = box;
     tiles_.rounded[side][threadIdx.x % kTile] = node;
@@ -110,7 +111,7 @@ class Direct {
       both.lo[k] = fminf(a.lo[k], b.lo[k]);
       both.hi[k] = fmaxf(a.hi[k], b.hi[k]);
     }
-    both = union_of_warp(both);
+    both = union_of_warp(both, {});
     if (lane_ == 0) tiles_.around[threadIdx.x / kFanOut] = both;
     __syncwarp();
   }
@@ -127,12 +128,16 @@ class Direct {
 #pragma unroll
     for (std::uint32_t i = 0; i < kShare; ++i) {
       const Node& theirs = tiles_.rounded[1][share_ + i];
-      hits |= may_meet(mine[0], theirs) ? 1u << i : 0;
-      hits |= may_meet(mine[1], theirs) ? 1u << 16 << i : 0;
+      hits |= may_meet(mine[0], theirs) && worlds_meet(mine[0], theirs) ? 1u << i : 0;
+      hits |= may_meet(mine[1], theirs) && worlds_meet(mine[1], theirs) ? 1u << 16 << i : 0;
     }
     if (own_ != other_) return hits;
     const int before = static_cast<int>(lane_) - static_cast<int>(share_);
     return hits & (bits_below(before) | bits_below(before + static_cast<int>(kFanOut)) << 16);
+  }
+
+  __device__ bool worlds_meet(const Node& a, const Node& b) const {
+    return rule_.worlds() == nullptr || tandem::worlds_meet(a.last, b.last);
   }
 
   __device__ std::uint32_t own_of(std::uint32_t bit) const {

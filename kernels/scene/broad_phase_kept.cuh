@@ -72,6 +72,8 @@ class KeptWalk {
   __device__ void begin(const WorldBox& box, std::uint32_t number) {
     box_ = box;
     number_ = number;
+    has_worlds_ = rule_.worlds() != nullptr;
+    if (has_worlds_) mine_.last = rule_.worlds()[number];
     for (int k = 0; k < 3; ++k) {
       mine_.lo[k] = scale_(box.lo[k], k);
       mine_.hi[k] = scale_(box.hi[k], k);
@@ -80,7 +82,9 @@ class KeptWalk {
 
   __device__ std::uint32_t children_hit(int level, std::uint32_t first) const {
     const std::uint32_t i = first + lane_index();
-    return __ballot_sync(kAllLanes, i < tree_.count[level] && may_meet(mine_, tree_.level(level)[i]));
+    const bool hit = i < tree_.count[level] && may_meet(mine_, tree_.level(level)[i]) &&
+                     (!has_worlds_ || mine_.leaf_worlds().meets(tree_.level(level)[i].worlds()));
+    return __ballot_sync(kAllLanes, hit);
   }
 
   __device__ void test_leaves(std::uint32_t first) {
@@ -89,9 +93,9 @@ class KeptWalk {
     unsigned long long key = 0;
     if (i < tree_.count[0]) {
       const Node theirs = tree_.level(0)[i];
-      const std::uint32_t a = min(number_, theirs.box), b = max(number_, theirs.box);
+      const std::uint32_t a = min(number_, theirs.box()), b = max(number_, theirs.box());
       meet = may_meet(mine_, theirs) &&
-             (surely_meet(mine_, theirs) || overlap(box_, load(boxes_, theirs.box))) && rule_(a, b);
+             (surely_meet(mine_, theirs) || overlap(box_, load(boxes_, theirs.box()))) && rule_(a, b);
       key = output_.key(a, b);
     }
     const std::uint32_t meeting = __ballot_sync(kAllLanes, meet);
@@ -107,6 +111,7 @@ class KeptWalk {
   const Output& output_;
   unsigned long long* waiting_;
   std::uint32_t count_ = 0, number_ = 0;
+  bool has_worlds_ = false;
   WorldBox box_ = {};
   Node mine_ = {};
 };

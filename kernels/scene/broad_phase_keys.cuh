@@ -139,10 +139,21 @@ __device__ std::uint32_t class_of(double edge, const Survey& survey, const Scale
   return min(octaves / 2, (1u << kClassBits) - 1);
 }
 
+// The worlds of boxes and how keys begin with them; null: there is one.
+struct WorldKeys {
+  const std::uint32_t* world;
+  int bits;  ///< so many of its lowest bits: the others of worlds that share them are told apart by the tree
+
+  __device__ Key before(Key rest, std::uint32_t box) const {
+    if (world == nullptr) return rest;
+    return rest >> bits | static_cast<Key>(world[box]) << (64 - bits);
+  }
+};
+
 template <typename Boxes>
 __global__ void __launch_bounds__(256)
     make_keys(const __grid_constant__ Boxes boxes, std::uint32_t count, int index_bits, const Survey* survey,
-              Key* keys, Counters* counters) {
+              const __grid_constant__ WorldKeys worlds, Key* keys, Counters* counters) {
   gpu::wait_for_kernel_before();
   const std::uint32_t i = blockIdx.x * blockDim.x + threadIdx.x;
   if (i >= count) return;
@@ -154,7 +165,8 @@ __global__ void __launch_bounds__(256)
   for (int k = 0; k < 3; ++k) cell[k] = cell_of(scale(centre(box, k), k));
   const Key place = static_cast<Key>(class_of(longest_edge(box), known, scale)) << 3 * kAxisBits |
                     along_curve(cell[0], cell[1], cell[2]);
-  keys[i] = place << kUnusedBits >> index_bits << index_bits | boxes.number(i);
+  const std::uint32_t number = boxes.number(i);
+  keys[i] = worlds.before(place << kUnusedBits, number) >> index_bits << index_bits | number;
 }
 
 }  // namespace

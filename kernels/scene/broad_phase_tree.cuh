@@ -3,6 +3,7 @@
 #include <cstdint>
 
 #include "tandem/formats/status.h"
+#include "tandem/kernels/pair_filter.h"
 #include "tandem/kernels/world_box.h"
 
 // The kernels of the broad phase share this: boxes in float32, a tree of them, and what kernels hand on.
@@ -14,8 +15,8 @@ constexpr std::uint32_t kFanOutBits = 5;
 constexpr int kMostLevels = 8;  // 32^7 > 2^32 boxes
 constexpr std::uint32_t kAllLanes = 0xFFFFFFFFu;
 
-// Boxes are sorted by this. From the highest bit down it has the class of size and the position on the curve,
-// and the box's index takes the place of the lowest bits.
+// Boxes are sorted by this. From the highest bit down it has the world where there are several, the class of
+// size and the position on the curve, and the box's index takes the place of the lowest bits.
 using Key = std::uint64_t;
 constexpr int kAxisBits = 16, kClassBits = 4;
 constexpr int kUnusedBits = 64 - kClassBits - 3 * kAxisBits;
@@ -46,11 +47,23 @@ __device__ std::uint32_t lowest(std::uint32_t bits) {
 // decide. What overflows becomes an infinity, which the same comparisons serve. NaN stands for nothing: it
 // meets no box and changes no union.
 
+//
+// A node above the leaves has the worlds of what is below it, and may_meet() leaves them aside: where there
+// is one world, nobody asks.
+
 struct alignas(16) Node {
   float lo[3];
-  std::uint32_t box;  // of leaves
+  std::uint32_t first;  // of a leaf the box, else the lowest world
   float hi[3];
-  float unused;
+  std::uint32_t last;  // of a leaf the world, else the highest one
+
+  __device__ std::uint32_t box() const { return first; }
+  __device__ WorldRange leaf_worlds() const { return WorldRange::of(last); }
+  __device__ WorldRange worlds() const { return {first, last}; }
+  __device__ void set_worlds(const WorldRange& range) {
+    first = range.first;
+    last = range.last;
+  }
 };
 
 __device__ Node nothing() {
@@ -68,8 +81,9 @@ __device__ bool surely_meet(const Node& a, const Node& b) {
          (a.lo[2] < b.hi[2]) & (b.lo[2] < a.hi[2]);
 }
 
-// The union of the warp's boxes, in every lane.
-__device__ Node union_of_warp(Node node) {
+// The union of the warp's boxes, in every lane; worlds: of the lane's own box.
+__device__ Node union_of_warp(Node node, const WorldRange& worlds) {
+  node.set_worlds({__reduce_min_sync(kAllLanes, worlds.first), __reduce_max_sync(kAllLanes, worlds.last)});
   for (int k = 0; k < 3; ++k) {
     for (int step = kFanOut / 2; step > 0; step /= 2) {
       node.lo[k] = fminf(node.lo[k], __shfl_xor_sync(kAllLanes, node.lo[k], step));

@@ -29,6 +29,7 @@ class Walk {
         group_(group),
         part_(part) {
     mine_ = leaf(group * kFanOut + lane_index());
+    has_worlds_ = rule.worlds() != nullptr;
     memory_.own[lane_index()] = mine_;
     around_ = tree_.level(1)[group];
     __syncwarp();
@@ -49,7 +50,9 @@ class Walk {
       }
       const std::uint32_t child = first + lowest(pending);
       pending &= pending - 1;
-      const std::uint32_t rows = __ballot_sync(kAllLanes, may_meet(mine_, tree_.level(level)[child]));
+      const Node& theirs = tree_.level(level)[child];
+      const std::uint32_t rows = __ballot_sync(
+          kAllLanes, may_meet(mine_, theirs) && (!has_worlds_ || mine_.leaf_worlds().meets(theirs.worlds())));
       if (rows == 0) continue;
       if (level == 1) {
         test_group(child, rows);
@@ -73,8 +76,13 @@ class Walk {
   __device__ std::uint32_t children_hit(int level, std::uint32_t first) const {
     const std::uint32_t i = first + lane_index();
     const bool hit = i < tree_.count[level] && i >= group_ >> kFanOutBits * (level - 1) &&
-                     may_meet(around_, tree_.level(level)[i]);
+                     may_meet(around_, tree_.level(level)[i]) &&
+                     (!has_worlds_ || around_.worlds().meets(tree_.level(level)[i].worlds()));
     return __ballot_sync(kAllLanes, hit) & (level == 1 ? part_ : kAllLanes);
+  }
+
+  __device__ bool leaves_may_meet(const Node& a, const Node& b) const {
+    return may_meet(a, b) && (!has_worlds_ || worlds_meet(a.last, b.last));
   }
 
   // rows: lanes whose own box may meet the other group. The fewer of these and of the other's boxes that may
@@ -82,7 +90,9 @@ class Walk {
   __device__ void test_group(std::uint32_t other, std::uint32_t rows) {
     const std::uint32_t first = other * kFanOut;
     const Node theirs = leaf(first + lane_index());
-    const std::uint32_t columns = __ballot_sync(kAllLanes, may_meet(around_, theirs));
+    const std::uint32_t columns =
+        __ballot_sync(kAllLanes, may_meet(around_, theirs) &&
+                                     (!has_worlds_ || around_.worlds().meets(theirs.leaf_worlds())));
     if (columns == 0) return;
     if (count_of(rows) <= count_of(columns)) {
       std::uint32_t hits = hits_of_rows(rows, theirs);
@@ -100,8 +110,8 @@ class Walk {
       const std::uint32_t low = lowest(rows),
                           high = 31 - static_cast<std::uint32_t>(__clz(static_cast<int>(rows)));
       const std::uint32_t two[2] = {1u << low, 1u << high};
-      hits |= may_meet(memory_.own[low], theirs) ? two[0] : 0;
-      hits |= may_meet(memory_.own[high], theirs) ? two[1] : 0;
+      hits |= leaves_may_meet(memory_.own[low], theirs) ? two[0] : 0;
+      hits |= leaves_may_meet(memory_.own[high], theirs) ? two[1] : 0;
       rows &= ~(two[0] | two[1]);
     }
     return hits;
@@ -117,7 +127,8 @@ class Walk {
         box.lo[k] = __shfl_sync(kAllLanes, theirs.lo[k], column);
         box.hi[k] = __shfl_sync(kAllLanes, theirs.hi[k], column);
       }
-      hits |= may_meet(mine_, box) ? 1u << column : 0;
+      box.last = __shfl_sync(kAllLanes, theirs.last, column);
+      hits |= leaves_may_meet(mine_, box) ? 1u << column : 0;
     }
     return hits;
   }
@@ -159,8 +170,8 @@ class Walk {
       if (first + lane_index() < count_) {
         const unsigned long long hit = memory_.waiting[first + lane_index()];
         const Node &own = memory_.own[hit >> 32], theirs = tree_.level(0)[static_cast<std::uint32_t>(hit)];
-        a = min(own.box, theirs.box);
-        b = max(own.box, theirs.box);
+        a = min(own.box(), theirs.box());
+        b = max(own.box(), theirs.box());
         meet = surely_meet(own, theirs) || overlap(boxes_[a], boxes_[b]);
         if (meet) meet = rule_(a, b);
       }
@@ -195,6 +206,7 @@ class Walk {
   const Output& output_;
   WarpMemory& memory_;
   std::uint32_t group_, part_, count_ = 0;
+  bool has_worlds_ = false;
   Node mine_, around_;
 };
 

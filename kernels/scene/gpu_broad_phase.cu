@@ -24,23 +24,26 @@ namespace {
 
 __global__ void __launch_bounds__(kFanOut* kFanOut)
     build_lower_levels(const WorldBox* boxes, const Key* sorted, int index_bits, const Survey* survey,
-                       const __grid_constant__ Tree tree) {
+                       const std::uint32_t* world, const __grid_constant__ Tree tree) {
   __shared__ Node above[kFanOut];
   gpu::wait_for_kernel_before();
   const std::uint32_t i = blockIdx.x * blockDim.x + threadIdx.x;
   const std::uint32_t lane = threadIdx.x % kFanOut, warp = threadIdx.x / kFanOut;
   Node node = nothing();
+  WorldRange worlds;
   if (i < tree.count[0]) {
     const Scale scale = scale_of(*survey);
-    node.box = static_cast<std::uint32_t>(sorted[i] & ((1ull << index_bits) - 1));
-    const WorldBox box = load(boxes, node.box);
+    node.first = static_cast<std::uint32_t>(sorted[i] & ((1ull << index_bits) - 1));
+    node.last = world != nullptr ? world[node.box()] : 0;
+    worlds = node.leaf_worlds();
+    const WorldBox box = load(boxes, node.box());
     for (int k = 0; k < 3; ++k) {
       node.lo[k] = scale(box.lo[k], k);
       node.hi[k] = scale(box.hi[k], k);
     }
     tree.level(0)[i] = node;
   }
-  node = union_of_warp(node);
+  node = union_of_warp(node, worlds);
   const std::uint32_t parent = i / kFanOut;
   if (lane == 0) {
     above[warp] = node;
@@ -49,7 +52,7 @@ __global__ void __launch_bounds__(kFanOut* kFanOut)
   if (tree.top < 2) return;
   __syncthreads();
   if (warp != 0) return;
-  node = union_of_warp(above[lane]);
+  node = union_of_warp(above[lane], above[lane].worlds());
   if (lane == 0) tree.level(2)[blockIdx.x] = node;
 }
 
@@ -59,8 +62,8 @@ __global__ void __launch_bounds__(kFanOut* kFanOut) build_upper_levels(const __g
   for (int level = 3; level <= tree.top; ++level) {
     for (std::uint32_t i = warp; i < tree.count[level]; i += kFanOut) {
       const std::uint32_t child = i * kFanOut + lane;
-      const Node node =
-          union_of_warp(child < tree.count[level - 1] ? tree.level(level - 1)[child] : nothing());
+      const Node below = child < tree.count[level - 1] ? tree.level(level - 1)[child] : nothing();
+      const Node node = union_of_warp(below, below.worlds());
       if (lane == 0) tree.level(level)[i] = node;
     }
     __syncthreads();
@@ -104,6 +107,9 @@ std::uint64_t nodes_over(std::uint64_t boxes) {
   return nodes_of(tree_over(static_cast<std::uint32_t>(boxes), nullptr));
 }
 
+// Keys keep so many bits of a box's number and of its world at most, so that some are left for its place.
+constexpr int kMostWorldBits = 24;
+
 // So many blocks at most share the tests of each against each.
 constexpr std::uint32_t kMostDirectBlocks = 2048;
 
@@ -112,11 +118,12 @@ int index_bits(std::uint32_t boxes) {
   return static_cast<int>(std::bit_width(std::max(boxes, 2u) - 1));
 }
 
-// The lowest bit that keys of so many boxes are sorted by, which have so many bits of an index. Eight bits
+// The lowest bit that keys of so many boxes are sorted by, which have so many bits of an index and begin with
+// so many of a world. Eight bits
 // cost one pass of the sort; the fewer boxes, the less it matters that some lie in one cell of the curve.
-int first_bit(std::uint32_t boxes, int bits) {
+int first_bit(std::uint32_t boxes, int bits, int world_bits) {
   const int passes = boxes <= 1u << 14 ? 3 : boxes <= 1u << 18 ? 4 : 6;
-  return std::max(64 - 8 * passes, bits);
+  return std::max(64 - 8 * passes - world_bits, bits);
 }
 
 // Warps that share a group: so many that small scenes fill a GPU too.
@@ -134,7 +141,7 @@ constexpr bool is_listed<Listed<Boxes>> = true;
 
 bool is_none(const PairFilter& filter) {
   return filter.motion == nullptr && filter.group == nullptr && filter.mask == nullptr &&
-         filter.excluded.slots == nullptr;
+         filter.world == nullptr && filter.excluded.slots == nullptr;
 }
 
 // Says what a call is about: the number of boxes or instances, where their boxes lie once they have been
@@ -289,23 +296,26 @@ struct gpu::HostOf<GpuBroadPhaseReport> : gpu::GpuHost<Outcome, GpuBroadPhaseRep
                   from, count, rule, output(call), tasks_each, tasks);
   }
 
-  // from: where the boxes of the tree come from.
+  // from: where the boxes of the tree come from. world: of each box; null: there is one. Where worlds have
+  // numbers below that of boxes, keys tell all of them apart.
   template <typename Boxes>
-  bool make_tree(const Boxes& from, const Tree& tree, Survey* surveyed, const Call& call) {
+  bool make_tree(const Boxes& from, const std::uint32_t* world, const Tree& tree, Survey* surveyed,
+                 const Call& call) {
     const std::uint32_t count = tree.count[0];
     const int bits = index_bits(call.numbers);
+    const WorldKeys worlds = {world, world != nullptr ? std::min(bits, kMostWorldBits) : 0};
     if (!launch(4, kSamples * kThreadsPerSample, call.stream, survey_boxes<Boxes>, from, count, surveyed) ||
         !launch(blocks_for(count, 256), 256, call.stream, make_keys<Boxes>, from, count, bits, surveyed,
-                keys.data(), &state->counters))
+                worlds, keys.data(), &state->counters))
       return false;
     cub::DoubleBuffer<Key> key(keys.data(), other_keys.data());
     std::size_t bytes = sorting.room();
-    if (!ok(cub::DeviceRadixSort::SortKeys(sorting.data(), bytes, key, count, first_bit(count, bits), 64,
-                                           call.stream)))
+    if (!ok(cub::DeviceRadixSort::SortKeys(sorting.data(), bytes, key, count,
+                                           first_bit(count, bits, worlds.bits), 64, call.stream)))
       return false;
     constexpr std::uint32_t kThreads = kFanOut * kFanOut;
     return launch(blocks_for(count, kThreads), kThreads, call.stream, build_lower_levels, call.boxes,
-                  key.Current(), bits, surveyed, tree) &&
+                  key.Current(), bits, surveyed, world, tree) &&
            (tree.top <= 2 || launch(1, kThreads, call.stream, build_upper_levels, tree));
   }
 
@@ -352,7 +362,8 @@ struct gpu::HostOf<GpuBroadPhaseReport> : gpu::GpuHost<Outcome, GpuBroadPhaseRep
       if (!test_all(from, count, rule, call)) return false;
     } else {
       const Tree tree = tree_over(count, nodes.data());
-      if (!make_tree(from, tree, survey.data(), call) || !collect(tree, rule, call)) return false;
+      if (!make_tree(from, rule.worlds(), tree, survey.data(), call) || !collect(tree, rule, call))
+        return false;
     }
     return !call.sorted || sort_pairs(call);
   }
@@ -414,7 +425,7 @@ struct gpu::HostOf<GpuBroadPhaseReport> : gpu::GpuHost<Outcome, GpuBroadPhaseRep
   // lie: where the boxes of those that are kept are to be found.
   template <typename Boxes>
   Status keep_fixed(const Boxes& all, const WorldBox* lie, std::span<const Motion> motion,
-                    cudaStream_t stream) {
+                    const std::uint32_t* world, cudaStream_t stream) {
     const auto count = static_cast<std::uint32_t>(motion.size());
     const auto fixed = static_cast<std::uint32_t>(std::count(motion.begin(), motion.end(), Motion::fixed));
     if (fixed == 0) return Status::kOk;
@@ -424,7 +435,7 @@ struct gpu::HostOf<GpuBroadPhaseReport> : gpu::GpuHost<Outcome, GpuBroadPhaseRep
     kept.tree = tree_over(fixed, kept_nodes.data());
     const Call call = {count, lie, lie, false, stream};
     const bool queued = begin(stream) &&
-                        make_tree(Listed<Boxes>{all, kept_list.data() + kept.free_count}, kept.tree,
+                        make_tree(Listed<Boxes>{all, kept_list.data() + kept.free_count}, world, kept.tree,
                                   kept_survey.data(), call) &&
                         launch(1, 1, stream, report_pairs, output(call));
     end(queued, stream);
@@ -460,23 +471,25 @@ struct gpu::HostOf<GpuBroadPhaseReport> : gpu::GpuHost<Outcome, GpuBroadPhaseRep
 };
 template class GpuQuestion<GpuBroadPhaseCapacity, GpuBroadPhaseReport, GpuBroadPhaseOptions>;
 
-Status GpuBroadPhase::keep_fixed(const WorldBox* boxes, std::span<const Motion> motion, cudaStream_t stream) {
+Status GpuBroadPhase::keep_fixed(const WorldBox* boxes, std::span<const Motion> motion,
+                                 const std::uint32_t* world, cudaStream_t stream) {
   if (host_ == nullptr) return Status::kOutOfMemory;
   host_->kept.of = 0;
   if (motion.size() >= kNoIndex) return Status::kOutOfRange;
   if (reinterpret_cast<std::uintptr_t>(boxes) % 16 != 0) return Status::kMisaligned;
-  return host_->keep_fixed(GivenBoxes{boxes}, boxes, motion, stream);
+  return host_->keep_fixed(GivenBoxes{boxes}, boxes, motion, world, stream);
 }
 
 Status GpuBroadPhase::keep_fixed(const GpuInstances& instances, const GpuAssetBounds& assets,
-                                 std::span<const Motion> motion, cudaStream_t stream) {
+                                 std::span<const Motion> motion, const std::uint32_t* world,
+                                 cudaStream_t stream) {
   if (host_ == nullptr) return Status::kOutOfMemory;
   auto& host = *host_;
   host.kept.of = 0;
   if (motion.size() != instances.count) return Status::kKeptMismatch;
   if (!host.reserve_taken(instances.count)) return host.failure();
   WorldBox* const boxes = host.boxes.data();
-  return host.keep_fixed(PosedBoxes{instances, assets, boxes}, boxes, motion, stream);
+  return host.keep_fixed(PosedBoxes{instances, assets, boxes}, boxes, motion, world, stream);
 }
 
 Status GpuBroadPhase::enqueue(const WorldBox* boxes, std::uint32_t count, const GpuBroadPhaseOptions& options,

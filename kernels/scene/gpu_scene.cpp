@@ -265,6 +265,7 @@ class Gpu final : public SceneDevice {
     if (status == Status::kOk)
       status = upload(any_removed ? group_ : scene.group, group_on_gpu_, filter_.group);
     if (status == Status::kOk) status = upload(any_removed ? mask_ : scene.mask, mask_on_gpu_, filter_.mask);
+    if (status == Status::kOk) status = upload(scene.world, world_on_gpu_, filter_.world);
     if (status == Status::kOk) status = wait();
     if (status == Status::kOk) version_ = scene.version;
     return status;
@@ -341,8 +342,8 @@ class Gpu final : public SceneDevice {
     Buffer<Motion> all_moving;
     if (!any_fixed && !all_moving.resize(instances_.count)) return Status::kOutOfMemory;
     std::fill_n(all_moving.data(), all_moving.size(), Motion::moving);
-    const Status status = broad_phase_.keep_fixed(instances_, bounds(),
-                                                  (any_fixed ? scene.motion : all_moving).view(), kStream);
+    const Status status = broad_phase_.keep_fixed(
+        instances_, bounds(), (any_fixed ? scene.motion : all_moving).view(), filter_.world, kStream);
     keeps_fixed_ = any_fixed;
     fixed_kept = any_fixed && status == Status::kOk;
     return status;
@@ -421,7 +422,7 @@ class Gpu final : public SceneDevice {
   Buffer<std::uint32_t> asset_, group_, mask_;
   Buffer<Pose> pose_;
   Buffer<RigidMotion> motions_;
-  GpuArray<std::uint32_t> asset_on_gpu_, group_on_gpu_, mask_on_gpu_, pair_count_;
+  GpuArray<std::uint32_t> asset_on_gpu_, group_on_gpu_, mask_on_gpu_, world_on_gpu_, pair_count_;
   GpuArray<Pose> pose_on_gpu_;
   GpuArray<Motion> motion_on_gpu_;
   GpuArray<RigidMotion> motions_on_gpu_;

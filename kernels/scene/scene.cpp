@@ -72,7 +72,7 @@ const Entry* data_or_null(const Buffer<Entry>& entries) {
 }  // namespace
 
 PairFilter SceneState::filter() const {
-  return {data_or_null(motion), data_or_null(group), data_or_null(mask), excluded};
+  return {data_or_null(motion), data_or_null(group), data_or_null(mask), data_or_null(world), excluded};
 }
 
 void SceneState::forget_assets() {
@@ -194,6 +194,7 @@ void SceneState::forget_bodies() {
   motion.clear();
   group.clear();
   mask.clear();
+  world.clear();
   excluded = {};
   found_of_.valid = fixed_kept_ = false;
   near_.forget();
@@ -290,14 +291,17 @@ bool SceneState::copy_entries(const Entry* from, Buffer<Entry>& to) {
 Status SceneState::set_filter(const PairFilter& filter) {
   const bool other_motion = copy_entries(filter.motion, motion);
   const bool other_group = copy_entries(filter.group, group), other_mask = copy_entries(filter.mask, mask);
+  const bool other_world = copy_entries(filter.world, world);
+  const bool other_kind = other_motion || other_group || other_mask || other_world;
   const bool other_excluded = excluded.slots != nullptr || filter.excluded.slots != nullptr;
   excluded = filter.excluded;
-  if (other_motion) fixed_kept_ = false;
-  if (other_motion || other_group || other_mask) near_.forget();
-  if (other_motion || other_group || other_mask || other_excluded) found_of_.valid = false;
+  if (other_motion || other_world) fixed_kept_ = false;
+  if (other_kind) near_.forget();
+  if (other_kind || other_excluded) found_of_.valid = false;
   const bool all_there = (filter.motion == nullptr || motion.size() == instances.size()) &&
                          (filter.group == nullptr || group.size() == instances.size()) &&
-                         (filter.mask == nullptr || mask.size() == instances.size());
+                         (filter.mask == nullptr || mask.size() == instances.size()) &&
+                         (filter.world == nullptr || world.size() == instances.size());
   return all_there ? Status::kOk : fail(Status::kOutOfMemory, 0);
 }
 
@@ -327,6 +331,7 @@ Status SceneState::add(const Instance& instance, const BodyFilter& filter, std::
   const auto shrink = [&](Status status) {
     const auto drop = [&](auto& entries) { (void)entries.resize(std::min(entries.size(), before)); };
     drop(instances), drop(bodies), drop(boxes), drop(changed_), drop(motion), drop(group), drop(mask);
+    drop(world);
     return fail(status, 0);
   };
   if (count > before &&
@@ -337,7 +342,8 @@ Status SceneState::add(const Instance& instance, const BodyFilter& filter, std::
   const BodyFilter usual;
   if (!add_entry(filter.motion, usual.motion, motion, free, count) ||
       !add_entry(filter.group, usual.group, group, free, count) ||
-      !add_entry(filter.mask, usual.mask, mask, free, count))
+      !add_entry(filter.mask, usual.mask, mask, free, count) ||
+      !add_entry(filter.world, usual.world, world, free, count))
     return shrink(Status::kOutOfMemory);
   if (const Status status = pose(free, instance); status != Status::kOk) return shrink(status);
   removed_ -= count == before;
@@ -457,7 +463,8 @@ Status SceneState::keep_fixed_bodies() {
   if (!any_fixed_ || fixed_kept_) return Status::kOk;
   const std::uint32_t workers = workers_for(boxes.size(), kBodiesAtOnce);
   if (!threads.provide(workers)) return Status::kCannotStartThread;
-  const Status status = broad_phase_.keep_fixed(boxes.view(), motion.view(), threads, workers);
+  const Status status =
+      broad_phase_.keep_fixed(boxes.view(), motion.view(), data_or_null(world), threads, workers);
   fixed_kept_ = status == Status::kOk;
   return status;
 }

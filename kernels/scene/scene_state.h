@@ -80,8 +80,8 @@ struct SceneState : Allocated {
   Buffer<Instance> instances;
   Buffer<PosedTree> bodies;
   Buffer<WorldBox> boxes;
-  Buffer<Motion> motion;  // this and the next two: empty where the filter has none
-  Buffer<std::uint32_t> group, mask;
+  Buffer<Motion> motion;  // this and the next three: empty where the filter has none
+  Buffer<std::uint32_t> group, mask, world;
   ExcludedPairs excluded;
 
   WorkerThreads threads;

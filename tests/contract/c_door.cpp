@@ -240,8 +240,10 @@ class CDoor final : public Door {
     filter.motion = bodies.motion.empty() ? nullptr : bodies.motion.data();
     filter.group = bodies.group.empty() ? nullptr : bodies.group.data();
     filter.mask = bodies.mask.empty() ? nullptr : bodies.mask.data();
+    filter.world = bodies.world.empty() ? nullptr : bodies.world.data();
     filter.excluded = excluded;
-    for (const std::size_t count : {bodies.motion.size(), bodies.group.size(), bodies.mask.size()})
+    for (const std::size_t count :
+         {bodies.motion.size(), bodies.group.size(), bodies.mask.size(), bodies.world.size()})
       filter.count = count > 0 ? count : filter.count;
     const bool none = filter.count == 0 && excluded == nullptr;
     const Outcome outcome = told(call(none ? nullptr : &filter));

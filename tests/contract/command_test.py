@@ -61,7 +61,7 @@ class Door:
     def write(self, step):
         asset, rotation, translation = self.bodies
         columns = {"instances/asset": asset, "instances/rotation": rotation, "instances/translation": translation, "simulation/motion": self.filter.get("motion"),
-                   "instances/group": self.filter.get("group"), "instances/mask": self.filter.get("mask"), "excluded": self.filter.get("excluded")}
+                   "instances/group": self.filter.get("group"), "instances/mask": self.filter.get("mask"), "instances/world": self.filter.get("world"), "excluded": self.filter.get("excluded")}
         if "pairs" in step:
             columns["pairs"] = np.array(step["pairs"], "u4").reshape(-1, 2)
         if "motion" in step:

@@ -100,6 +100,7 @@ Bodies bodies_of(const Json& list, const Json& filter) {
                    column<std::uint8_t>(filter, "motion"),
                    column<std::uint32_t>(filter, "group"),
                    column<std::uint32_t>(filter, "mask"),
+                   column<std::uint32_t>(filter, "world"),
                    {}};
   if (filter.contains("excluded")) bodies.excluded = pairs_of(filter["excluded"]);
   return bodies;

@@ -38,6 +38,7 @@ class CppDoor final : public Door {
     if (!motion.empty()) filter.motion = motion.data();
     if (!bodies.group.empty()) filter.group = bodies.group.data();
     if (!bodies.mask.empty()) filter.mask = bodies.mask.data();
+    if (!bodies.world.empty()) filter.world = bodies.world.data();
     filter.excluded = excluded_.view();
     return told(scene_->place(bodies.instances, filter));
   }
@@ -46,6 +47,7 @@ class CppDoor final : public Door {
     if (!body.motion.empty()) filter.motion = static_cast<Motion>(body.motion[0]);
     if (!body.group.empty()) filter.group = body.group[0];
     if (!body.mask.empty()) filter.mask = body.mask[0];
+    if (!body.world.empty()) filter.world = body.world[0];
     return told(scene_->add(body.instances[0], number, filter));
   }
   Outcome move(const std::vector<std::uint32_t>& numbers, const Bodies& bodies) override {

@@ -20,8 +20,8 @@ using Json = nlohmann::json;
 /// Bodies of the table, ready for any door.
 struct Bodies {
   std::vector<Instance> instances;
-  std::vector<std::uint8_t> motion;  ///< or empty, as the next three
-  std::vector<std::uint32_t> group, mask;
+  std::vector<std::uint8_t> motion;  ///< or empty, as the next four
+  std::vector<std::uint32_t> group, mask, world;
   std::vector<ObjectPair> excluded;
 };
 

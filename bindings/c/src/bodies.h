@@ -62,7 +62,8 @@ inline tandem_status read_filter(const tandem_pair_filter* given, size_t bodies,
                                  uint64_t& where) {
   if (const tandem_status status = read_struct(given, read); status != TANDEM_OK) return status;
   if (read.reserved != 0) return TANDEM_BAD_OPTION;
-  const bool has_rows = read.motion != nullptr || read.group != nullptr || read.mask != nullptr;
+  const bool has_rows =
+      read.motion != nullptr || read.group != nullptr || read.mask != nullptr || read.world != nullptr;
   if (has_rows && read.count != bodies) return TANDEM_FILTER_MISMATCH;
   const size_t unknown = read.motion != nullptr ? first_unknown_motion(read.motion, bodies) : bodies;
   if (unknown == bodies) return TANDEM_OK;

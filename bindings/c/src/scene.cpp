@@ -82,8 +82,8 @@ tandem_status place(tandem_scene& self, const tandem_instance* instances, size_t
   if (status != TANDEM_OK) return status;
   const auto* motion = reinterpret_cast<const Motion*>(read.motion);
   const ExcludedPairs excluded = read.excluded != nullptr ? read.excluded->table.view() : ExcludedPairs();
-  const Status placed =
-      self.scene.place(rows<Instance>(instances, count), {motion, read.group, read.mask, excluded});
+  const Status placed = self.scene.place(rows<Instance>(instances, count),
+                                         {motion, read.group, read.mask, read.world, excluded});
   if (placed == Status::kOk) self.keep(read.excluded);
   return self.told(placed);
 }
@@ -308,6 +308,7 @@ tandem_status tandem_scene_add(tandem_scene* scene, const tandem_instance* insta
     if (read.motion != nullptr) of_body.motion = static_cast<Motion>(*read.motion);
     if (read.group != nullptr) of_body.group = *read.group;
     if (read.mask != nullptr) of_body.mask = *read.mask;
+    if (read.world != nullptr) of_body.world = *read.world;
     uint32_t number = 0;
     const Status added = self.scene.add(*rows<Instance>(instance, 1).data(), number, of_body);
     if (added != Status::kOk) return self.told(added);

@@ -170,6 +170,7 @@ tandem_status set_bodies(tandem_world& self, const tandem_instance* instances, s
     if (read.motion != nullptr) body.filter.motion = static_cast<Motion>(read.motion[i]);
     if (read.group != nullptr) body.filter.group = read.group[i];
     if (read.mask != nullptr) body.filter.mask = read.mask[i];
+    if (read.world != nullptr) body.filter.world = read.world[i];
     const auto take = [i](const double* from, double& to) { to = from != nullptr ? from[i] : to; };
     take(starts.density, body.density);
     take(starts.friction, body.material.friction);

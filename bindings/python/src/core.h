@@ -57,7 +57,7 @@ class Asset {
 /// Says which pairs a scene looks at. It has copies of what it was made of, and never changes.
 class Filter {
  public:
-  Filter(nb::object motion, nb::object group, nb::object mask, nb::object excluded);
+  Filter(nb::object motion, nb::object group, nb::object mask, nb::object world, nb::object excluded);
   ~Filter() { tandem_excluded_pairs_destroy(excluded_); }
   Filter(const Filter&) = delete;
   Filter& operator=(const Filter&) = delete;
@@ -68,7 +68,7 @@ class Filter {
 
  private:
   std::vector<std::uint8_t> motion_;
-  std::vector<std::uint32_t> group_, mask_;
+  std::vector<std::uint32_t> group_, mask_, world_;
   tandem_excluded_pairs* excluded_ = nullptr;
   tandem_pair_filter filter_ = {};
 };

@@ -13,11 +13,12 @@ const Value* take(nb::handle given, std::vector<Value>& values, std::size_t& cou
 
 }  // namespace
 
-Filter::Filter(nb::object motion, nb::object group, nb::object mask, nb::object excluded) {
+Filter::Filter(nb::object motion, nb::object group, nb::object mask, nb::object world, nb::object excluded) {
   filter_.struct_size = sizeof filter_;
   filter_.motion = take(motion, motion_, filter_.count);
   filter_.group = take(group, group_, filter_.count);
   filter_.mask = take(mask, mask_, filter_.count);
+  filter_.world = take(world, world_, filter_.count);
   if (excluded.is_none()) return;
   const auto pairs = copy_rows<tandem_object_pair>(excluded);
   check(tandem_excluded_pairs_create(pairs.data(), pairs.size(), nullptr, &excluded_));
@@ -26,8 +27,8 @@ Filter::Filter(nb::object motion, nb::object group, nb::object mask, nb::object 
 
 void add_filters(nb::module_& module) {
   nb::class_<Filter>(module, "Filter")
-      .def(nb::init<nb::object, nb::object, nb::object, nb::object>(), nb::arg().none(), nb::arg().none(),
-           nb::arg().none(), nb::arg().none());
+      .def(nb::init<nb::object, nb::object, nb::object, nb::object, nb::object>(), nb::arg().none(),
+           nb::arg().none(), nb::arg().none(), nb::arg().none(), nb::arg().none());
 }
 
 }  // namespace tandem::python

@@ -20,6 +20,9 @@ _frombuffer = np.frombuffer
 _MODES = {"exact": 0, "fast": 1, "boxes": 2}
 _MOST = 0xFFFFFFFF
 
+#: The world of a body that is in all worlds (see Filter).
+EVERY_WORLD = _MOST
+
 
 class Counters(NamedTuple):
     """Work that a call did."""
@@ -105,6 +108,7 @@ class Filter:
         motion: (n,), of each body MOVING, FIXED, KINEMATIC or SLEEPING; pairs without anything that moves are not looked at.
         group: (n,), the groups that a body is in, a bit each; all where not given.
         mask: (n,), the groups that it meets; all where not given. Two are looked at where each is in a group of the other's mask.
+        world: (n,), the world of each body: only bodies of one world are looked at, and those of EVERY_WORLD with all. Worlds may lie in one place.
         excluded: (m, 2) or array of PAIR: pairs that are not looked at, in any order.
 
     >>> fixed = tandem.Filter(motion=[tandem.FIXED, tandem.FIXED, tandem.MOVING])
@@ -115,15 +119,16 @@ class Filter:
     __slots__ = ("_core", "_motion")
 
     def __init__(self, motion: npt.ArrayLike | None = None, group: npt.ArrayLike | None = None, mask: npt.ArrayLike | None = None,
-                 excluded: npt.ArrayLike | None = None):
+                 world: npt.ArrayLike | None = None, excluded: npt.ArrayLike | None = None):
         motions = None if motion is None else whole_numbers(motion, "motion", 255, np.uint8)
         groups = None if group is None else whole_numbers(group, "group")
         masks = None if mask is None else whole_numbers(mask, "mask")
-        shapes = {name: array.shape for name, array in (("motion", motions), ("group", groups), ("mask", masks)) if array is not None}
+        worlds = None if world is None else whole_numbers(world, "world")
+        shapes = {name: array.shape for name, array in (("motion", motions), ("group", groups), ("mask", masks), ("world", worlds)) if array is not None}
         for name, shape in shapes.items():
             if len(shape) != 1 or shape != next(iter(shapes.values())):
                 raise ValueError(f"{name} has shape {shape} where (n,) is wanted, the same as of the others")
-        self._core = _tandem.Filter(motions, groups, masks, pairs_of(excluded, "excluded"))
+        self._core = _tandem.Filter(motions, groups, masks, worlds, pairs_of(excluded, "excluded"))
         self._motion = None if motions is None else motions.copy()
 
 
@@ -240,12 +245,12 @@ class Scene:
         return self
 
     def add(self, asset: int = 0, *, rotation: Rotations | None = None, translation: npt.ArrayLike | None = None, transform: npt.ArrayLike | None = None,
-            motion: int = 0, group: int = _MOST, mask: int = _MOST) -> int:
+            motion: int = 0, group: int = _MOST, mask: int = _MOST, world: int = _MOST) -> int:
         """Adds a body and leaves the others alone. Returns its number, the lowest that is free.
 
         Args:
             asset, rotation, translation, transform: of one body (see `tandem.instances`).
-            motion, group, mask: the body's, as of Filter.
+            motion, group, mask, world: the body's, as of Filter.
 
         Raises:
             Error: as of `place`; nothing has changed then.
@@ -256,7 +261,7 @@ class Scene:
         body = instances_of(None, asset, rotation, translation, transform)
         if len(body) != 1:
             raise ValueError(f"{len(body)} bodies where one is wanted")
-        filter = None if (motion, group, mask) == (0, _MOST, _MOST) else Filter([motion], [group], [mask])
+        filter = None if (motion, group, mask, world) == (0, _MOST, _MOST, _MOST) else Filter([motion], [group], [mask], [world])
         try:
             return self._core.add(body, _core_of(filter))
         except Error as error:

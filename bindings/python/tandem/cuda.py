@@ -166,14 +166,14 @@ class Filter:
 
     Args:
         motion: (n,) uint8, of each instance MOVING, FIXED, KINEMATIC or SLEEPING.
-        group, mask: (n,) uint32 or int32.
+        group, mask, world: (n,) uint32 or int32.
         excluded: (m, 2) or array of PAIR, in CPU memory, which are copied.
     """
 
     __slots__ = ("_core",)
 
-    def __init__(self, motion: Any = None, group: Any = None, mask: Any = None, excluded: npt.ArrayLike | None = None, *, device: int = 0, stream: Any = None):
-        self._core = _cuda.Filter(motion, group, mask, pairs_of(excluded, "excluded"), _stream(stream), device)
+    def __init__(self, motion: Any = None, group: Any = None, mask: Any = None, world: Any = None, excluded: npt.ArrayLike | None = None, *, device: int = 0, stream: Any = None):
+        self._core = _cuda.Filter(motion, group, mask, world, pairs_of(excluded, "excluded"), _stream(stream), device)
 
 
 class Queued:

@@ -119,7 +119,7 @@ def _read(path: pathlib.Path, file: Any) -> Scene:
     if is_run or moved_by in file:
         motion[:] = _dataset(path, file, moved_by, count)
     steps, rotation, translation = (_states if is_run else _state)(path, file, count)
-    limits = {name: _dataset(path, file, f"instances/{name}", count) for name in ("group", "mask")
+    limits = {name: _dataset(path, file, f"instances/{name}", count) for name in ("group", "mask", "world")
               if f"instances/{name}" in file}
     if "excluded" in file:
         limits["excluded"] = file["excluded"][:]

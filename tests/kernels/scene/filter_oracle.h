@@ -14,14 +14,14 @@ namespace tandem::test {
 /// Arrays of a filter, in CPU memory.
 struct FilterArrays {
   std::vector<Motion> motion;
-  std::vector<std::uint32_t> group, mask;
+  std::vector<std::uint32_t> group, mask, world;
   std::vector<ObjectPair> excluded;
 
   /// table: owns the excluded pairs.
   PairFilter view(ExcludedPairTable& table) const {
     static_cast<void>(table.set(excluded));
     return {motion.empty() ? nullptr : motion.data(), group.empty() ? nullptr : group.data(),
-            mask.empty() ? nullptr : mask.data(), table.view()};
+            mask.empty() ? nullptr : mask.data(), world.empty() ? nullptr : world.data(), table.view()};
   }
 };
 
@@ -37,6 +37,7 @@ inline FilterArrays random_filter(std::uint32_t count, unsigned parts, std::uint
     if (parts & 1) filter.motion.push_back(kMotions[below(6)]);
     if (parts & 2) filter.group.push_back(i % 10 == 3 ? 0x80000000u : 1u << below(3));
     if (parts & 4) filter.mask.push_back(static_cast<std::uint32_t>(random()) | below(8));
+    if (parts & 16) filter.world.push_back(below(16) == 0 ? kEveryWorld : below(5) * 0x1000'0001u);
     if ((parts & 8) && i > 0) {
       const std::uint32_t other = i - 1 - below(i < 20 ? i : 20);
       filter.excluded.push_back(below(2) == 0 ? ObjectPair{i, other} : ObjectPair{other, i});
@@ -58,7 +59,7 @@ class FilterOracle {
   }
 
   bool looks_at(std::uint32_t a, std::uint32_t b) const {
-    return move(a, b) && names(a, b) && names(b, a) && excluded_.count({a, b}) == 0;
+    return share_a_world(a, b) && move(a, b) && names(a, b) && names(b, a) && excluded_.count({a, b}) == 0;
   }
 
  private:
@@ -67,6 +68,12 @@ class FilterOracle {
   bool move(std::uint32_t a, std::uint32_t b) const {
     if (motion(a) == Motion::moving || motion(b) == Motion::moving) return true;
     return std::set{motion(a), motion(b)} == std::set{Motion::kinematic, Motion::sleeping};
+  }
+
+  bool share_a_world(std::uint32_t a, std::uint32_t b) const {
+    if (filter_.world.empty()) return true;
+    const std::set<std::uint32_t> worlds = {filter_.world[a], filter_.world[b]};
+    return worlds.size() == 1 || worlds.count(kEveryWorld) != 0;
   }
 
   // Whether a's mask names a group of b's.

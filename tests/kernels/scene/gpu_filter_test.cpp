@@ -24,7 +24,7 @@ using test::Pairs;
 using test::random_filter;
 using test::same;
 
-constexpr unsigned kAllParts = 15, kMotionPart = 1;
+constexpr unsigned kAllParts = 31, kMotionPart = 1;
 
 class GpuFilterTest : public test::GpuTest {};
 
@@ -38,17 +38,22 @@ Pairs stored(const GpuBroadPhase& broad_phase) {
 class GpuFilter {
  public:
   explicit GpuFilter(const FilterArrays& arrays)
-      : motion_(on_gpu(arrays.motion)), group_(on_gpu(arrays.group)), mask_(on_gpu(arrays.mask)) {
+      : motion_(on_gpu(arrays.motion)),
+        group_(on_gpu(arrays.group)),
+        mask_(on_gpu(arrays.mask)),
+        world_(on_gpu(arrays.world)) {
     ExcludedPairTable table;
     EXPECT_EQ(table.set(arrays.excluded), Status::kOk);
     EXPECT_EQ(excluded_.upload(table.view(), nullptr), Status::kOk);
   }
-  PairFilter view() const { return {motion_.data(), group_.data(), mask_.data(), excluded_.view()}; }
+  PairFilter view() const {
+    return {motion_.data(), group_.data(), mask_.data(), world_.data(), excluded_.view()};
+  }
   Motion* motion() const { return motion_.data(); }
 
  private:
   GpuArray<Motion> motion_;
-  GpuArray<std::uint32_t> group_, mask_;
+  GpuArray<std::uint32_t> group_, mask_, world_;
   GpuExcludedPairs excluded_;
 };
 
@@ -90,7 +95,8 @@ void expect_as_cpu(GpuBroadPhase& broad_phase, const Boxes& boxes, const FilterA
   const Pairs expected = of_cpu(grown_for(boxes, filter, kept, within), filter);
   const auto device = on_gpu(boxes);
   const GpuFilter on_device(filter);
-  ASSERT_EQ(broad_phase.keep_fixed(device.data(), keep ? filter.motion : std::vector<Motion>(), nullptr),
+  ASSERT_EQ(broad_phase.keep_fixed(device.data(), keep ? filter.motion : std::vector<Motion>(),
+                                   on_device.view().world, nullptr),
             Status::kOk)
       << what;
   for (const bool sorted : {false, true}) {
@@ -115,6 +121,24 @@ TEST_F(GpuFilterTest, FindsThePairsOfTheCpuWhateverTheFilterAndWhatIsKept) {
                       std::to_string(count) + " near boxes, filter " + std::to_string(parts), 0.125);
       }
     }
+  }
+}
+
+// Worlds of a few bodies each that lie in one place, numbered by chance, beside bodies of every world.
+TEST_F(GpuFilterTest, WorldsThatLieInOnePlace) {
+  GpuBroadPhase broad_phase;
+  for (const std::uint32_t count : {600u, kFewBoxes, 5 * kFewBoxes}) {
+    const Boxes place = scattered(20, 3);
+    std::mt19937 random(count);
+    Boxes boxes;
+    FilterArrays filter;
+    for (std::uint32_t i = 0; i < count; ++i) {
+      boxes.push_back(place[i % 20]);
+      filter.world.push_back(i % 500 == 0 ? kEveryWorld : i / 20 * (i % 3 == 0 ? 1u : 1000u));
+      filter.motion.push_back(random() % 4 == 0 ? Motion::fixed : Motion::moving);
+    }
+    for (const bool keep : {false, true})
+      expect_as_cpu(broad_phase, boxes, filter, keep, std::to_string(count) + " bodies in worlds");
   }
 }
 
@@ -189,7 +213,9 @@ TEST_F(GpuFilterTest, KeptInstancesAreNotLookedAtAgain) {
     const GpuFilter on_device(filter);
     const Pairs expected = of_cpu(boxes, filter);
     EXPECT_FALSE(expected.empty());
-    ASSERT_EQ(broad_phase.keep_fixed(GpuBodies(bodies).view(), bounds, filter.motion, nullptr), Status::kOk);
+    ASSERT_EQ(broad_phase.keep_fixed(GpuBodies(bodies).view(), bounds, filter.motion, on_device.view().world,
+                                     nullptr),
+              Status::kOk);
     for (std::uint32_t i = 0; i < count; ++i) {
       if (filter.motion[i] != Motion::fixed) continue;
       bodies.asset[i] = 99;
@@ -202,7 +228,8 @@ TEST_F(GpuFilterTest, KeptInstancesAreNotLookedAtAgain) {
     const GpuBroadPhaseOptions near = {true, on_device.view(), 0.25};
     ASSERT_EQ(broad_phase.find_pairs(later.view(), bounds, near, nullptr), Status::kOk);
     EXPECT_TRUE(same(stored(broad_phase), of_cpu(grown_for(boxes, filter, true, 0.25), filter)));
-    EXPECT_EQ(broad_phase.keep_fixed(later.view(), bounds, filter.motion, nullptr), Status::kUnknownAsset);
+    EXPECT_EQ(broad_phase.keep_fixed(later.view(), bounds, filter.motion, on_device.view().world, nullptr),
+              Status::kUnknownAsset);
     const auto first = std::find(filter.motion.begin(), filter.motion.end(), Motion::fixed);
     EXPECT_EQ(broad_phase.report().where, static_cast<std::uint32_t>(first - filter.motion.begin()));
     EXPECT_EQ(broad_phase.find_pairs(later.view(), bounds, {true, on_device.view()}, nullptr),
@@ -217,8 +244,9 @@ TEST_F(GpuFilterTest, NamesWhatItCannotTake) {
   filter.motion[8] = Motion::moving;
   GpuBroadPhase broad_phase;
   auto device = on_gpu(boxes);
-  EXPECT_EQ(broad_phase.keep_fixed(test::misaligned(device), filter.motion, nullptr), Status::kMisaligned);
-  ASSERT_EQ(broad_phase.keep_fixed(device.data(), filter.motion, nullptr), Status::kOk);
+  EXPECT_EQ(broad_phase.keep_fixed(test::misaligned(device), filter.motion, nullptr, nullptr),
+            Status::kMisaligned);
+  ASSERT_EQ(broad_phase.keep_fixed(device.data(), filter.motion, nullptr, nullptr), Status::kOk);
   EXPECT_EQ(broad_phase.find_pairs(device.data(), kFew - 1, {}, nullptr), Status::kKeptMismatch);
   ASSERT_EQ(broad_phase.find_pairs(device.data(), kFew, {true}, nullptr), Status::kOk);
   const Pairs expected = stored(broad_phase);
@@ -247,14 +275,15 @@ TEST_F(GpuFilterTest, NamesWhatItCannotTake) {
   const GpuBodies on_device(bodies);
   const GpuBounds on_device_bounds(kBounds);
   const GpuAssetBounds bounds = on_device_bounds.view();
-  EXPECT_EQ(broad_phase.keep_fixed(on_device.view(), bounds, std::span(filter.motion).first(9), nullptr),
-            Status::kKeptMismatch);
-  ASSERT_EQ(broad_phase.keep_fixed(on_device.view(), bounds, filter.motion, nullptr), Status::kOk);
+  EXPECT_EQ(
+      broad_phase.keep_fixed(on_device.view(), bounds, std::span(filter.motion).first(9), nullptr, nullptr),
+      Status::kKeptMismatch);
+  ASSERT_EQ(broad_phase.keep_fixed(on_device.view(), bounds, filter.motion, nullptr, nullptr), Status::kOk);
   EXPECT_EQ(broad_phase.find_pairs(device.data(), kFew, {}, nullptr), Status::kKeptMismatch);
   EXPECT_EQ(broad_phase.find_pairs(on_device.view(), bounds, {}, nullptr), Status::kOk);
   ASSERT_EQ(broad_phase.reserve({.instances = 2 * kFew}), Status::kOk);
   EXPECT_EQ(broad_phase.find_pairs(on_device.view(), bounds, {}, nullptr), Status::kKeptMismatch);
-  ASSERT_EQ(broad_phase.keep_fixed(on_device.view(), bounds, filter.motion, nullptr), Status::kOk);
+  ASSERT_EQ(broad_phase.keep_fixed(on_device.view(), bounds, filter.motion, nullptr, nullptr), Status::kOk);
   EXPECT_EQ(broad_phase.find_pairs(on_device.view(), bounds, {}, nullptr), Status::kOk);
 }
 
@@ -266,7 +295,8 @@ TEST_F(GpuFilterTest, OverflowIsReportedAndARetryLosesNothing) {
     const GpuFilter on_device(filter);
     const auto device = on_gpu(boxes);
     GpuBroadPhase broad_phase;
-    ASSERT_EQ(broad_phase.keep_fixed(device.data(), filter.motion, nullptr), Status::kOk);
+    ASSERT_EQ(broad_phase.keep_fixed(device.data(), filter.motion, on_device.view().world, nullptr),
+              Status::kOk);
     test::expect_overflow_is_reported(broad_phase, device, count, {true, on_device.view()}, expected);
   }
 }
@@ -279,7 +309,8 @@ TEST_F(GpuFilterTest, AGraphSeesFlagsThatChange) {
     const GpuFilter on_device(filter);
     const auto device = on_gpu(boxes);
     GpuBroadPhase broad_phase;
-    ASSERT_EQ(broad_phase.keep_fixed(device.data(), filter.motion, nullptr), Status::kOk);
+    ASSERT_EQ(broad_phase.keep_fixed(device.data(), filter.motion, on_device.view().world, nullptr),
+              Status::kOk);
     ASSERT_EQ(broad_phase.reserve({count, 20 * count}, {true}), Status::kOk);
     test::GraphStream stream;
     stream.capture([&] {

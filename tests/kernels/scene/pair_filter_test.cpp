@@ -22,7 +22,7 @@ using test::random_filter;
 using Boxes = std::vector<WorldBox>;
 using Pairs = std::vector<std::pair<std::uint32_t, std::uint32_t>>;
 
-constexpr unsigned kAllParts = 15, kMotionPart = 1;
+constexpr unsigned kAllParts = 31, kMotionPart = 1;
 
 Pairs brute_force(const Boxes& boxes, const FilterArrays& filter, bool self_pairs = false) {
   const FilterOracle oracle(filter);
@@ -152,7 +152,8 @@ TEST(BroadPhaseFilter, FindsThePairsOfBruteForceWhateverTheFilterTheWorkersAndWh
           std::uint64_t work = 0;
           for (const std::uint32_t workers : {1u, 2u, 3u, 7u, 16u}) {
             if (keep && !filter.motion.empty()) {
-              ASSERT_EQ(broad_phase.keep_fixed(boxes, filter.motion, threads, workers), Status::kOk);
+              ASSERT_EQ(broad_phase.keep_fixed(boxes, filter.motion, view.world, threads, workers),
+                        Status::kOk);
             }
             ASSERT_EQ(broad_phase.find_pairs(boxes, view, self_pairs, threads, workers), Status::kOk);
             EXPECT_EQ(pairs_of(broad_phase), expected)
@@ -215,6 +216,38 @@ TEST(BroadPhaseFilter, EndsTheWalkAboveBoxesOfWhichItAdmitsNoPair) {
   ASSERT_EQ(broad_phase.find_pairs(boxes, at_rest.view(table)), Status::kOk);
   EXPECT_EQ(broad_phase.pairs().size(), kCount - 1);
   EXPECT_LT(broad_phase.group_pairs(), kCount);
+}
+
+// 200 worlds of 20 bodies, of which a quarter is fixed: in one place, and far apart.
+TEST(BroadPhaseFilter, WorldsInOnePlaceCostWhatWorldsFarApartDo) {
+  const Boxes place = scattered(20, 3);
+  Boxes together, apart;
+  FilterArrays filter;
+  for (std::uint32_t i = 0; i < 4000; ++i) {
+    const std::uint32_t world = i * 7 % 4000 / 20;
+    WorldBox box = place[i * 7 % 20];
+    together.push_back(box);
+    const double shift[3] = {3e7 * (world % 6), 3e7 * (world / 6 % 6), 3e7 * (world / 36)};
+    for (int k = 0; k < 3; ++k) box.lo[k] += shift[k], box.hi[k] += shift[k];
+    apart.push_back(box);
+    filter.motion.push_back(i % 4 == 0 ? Motion::fixed : Motion::moving);
+    filter.world.push_back(world);
+  }
+  ExcludedPairTable table;
+  PairFilter far = filter.view(table);
+  far.world = nullptr;
+  for (const bool keep : {false, true}) {
+    BroadPhase in_worlds, in_one;
+    if (keep) {
+      ASSERT_EQ(in_worlds.keep_fixed(together, filter.motion, filter.world.data()), Status::kOk);
+      ASSERT_EQ(in_one.keep_fixed(apart, filter.motion), Status::kOk);
+    }
+    ASSERT_EQ(in_worlds.find_pairs(together, filter.view(table)), Status::kOk);
+    ASSERT_EQ(in_one.find_pairs(apart, far), Status::kOk);
+    EXPECT_EQ(pairs_of(in_worlds), pairs_of(in_one)) << keep;
+    EXPECT_EQ(pairs_of(in_worlds), brute_force(together, filter)) << keep;
+    EXPECT_LT(in_worlds.group_pairs(), in_one.group_pairs() + in_one.group_pairs() / 5) << keep;
+  }
 }
 
 TEST(BroadPhaseFilter, LooksAtNoKeptBoxAgain) {

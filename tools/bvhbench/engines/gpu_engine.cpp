@@ -94,14 +94,15 @@ void GpuEngine::update(std::span<const BodyPose> bodies) {
   if (!motion_.empty()) stage(motion_, motions_, "instances", std::identity());
   check(stream_.wait(), "upload");
   instances_ = {shape_of_.on_gpu.data(), poses_.on_gpu.data(), static_cast<std::uint32_t>(bodies.size())};
-  check(broad_phase_.keep_fixed({}, {}, {}, stream()), broad_phase_.cuda_error(), "broad phase");
+  check(broad_phase_.keep_fixed({}, {}, {}, nullptr, stream()), broad_phase_.cuda_error(), "broad phase");
   upload_of_bodies_ = watch.lap();
 }
 
 void GpuEngine::keep_fixed() {
   if (filter_.motion == nullptr) return;
   const std::span<const Motion> motion(filter_.motion, instances_.count);
-  const Status status = broad_phase_.keep_fixed(instances_, bounds(), motion, stream());
+  const Status status =
+      broad_phase_.keep_fixed(instances_, bounds(), motion, upload_filter().world, stream());
   check(status, broad_phase_, "broad phase");
 }
 
@@ -116,7 +117,8 @@ const Element* GpuEngine::upload_of_each(const Element* of_each, StagedArray<Ele
 const PairFilter& GpuEngine::upload_filter() {
   check(excluded_.upload(filter_.excluded, stream()), excluded_.cuda_error(), "filter");
   filter_on_gpu_ = {upload_of_each(filter_.motion, filter_motion_), upload_of_each(filter_.group, group_),
-                    upload_of_each(filter_.mask, mask_), excluded_.view()};
+                    upload_of_each(filter_.mask, mask_), upload_of_each(filter_.world, world_),
+                    excluded_.view()};
   return filter_on_gpu_;
 }
 
@@ -199,7 +201,8 @@ Seconds GpuEngine::time_repeats(std::uint32_t repeats, const std::function<void(
 std::size_t GpuEngine::scene_bytes(const TimedQuery& asked) const {
   return uploaded_.bytes() + bounds_count_ * sizeof(AssetBounds) +
          instances_.count * (sizeof(Pose) + sizeof(std::uint32_t)) + motions_.on_gpu.bytes() +
-         filter_motion_.on_gpu.bytes() + group_.on_gpu.bytes() + mask_.on_gpu.bytes() + excluded_.bytes() +
+         filter_motion_.on_gpu.bytes() + group_.on_gpu.bytes() + mask_.on_gpu.bytes() +
+         world_.on_gpu.bytes() + excluded_.bytes() +
          (asked.given != nullptr ? asked.given->size() * sizeof(ObjectPair) : 0);
 }
 

@@ -129,7 +129,7 @@ class GpuEngine : public Engine {
   PinnedArray<ObjectPair> found_pairs_;
   GpuInstances instances_ = {};
   StagedArray<Motion> filter_motion_;
-  StagedArray<std::uint32_t> group_, mask_;
+  StagedArray<std::uint32_t> group_, mask_, world_;
   GpuExcludedPairs excluded_;
   PairFilter filter_on_gpu_;
   GpuBroadPhase broad_phase_;

@@ -19,8 +19,8 @@ bool pass_scene(Stream& stream, Scene& scene) {
   };
   return pass_texts(scene.assets) && pass_array(scene.instances) && pass_array(scene.level) &&
          pass_array(scene.filter.motion) && pass_array(scene.filter.group) && pass_array(scene.filter.mask) &&
-         pass_array(scene.filter.excluded) && stream.optional(scene.pairs, pass_array) &&
-         stream.optional(scene.poses, pass_notes);
+         pass_array(scene.filter.world) && pass_array(scene.filter.excluded) &&
+         stream.optional(scene.pairs, pass_array) && stream.optional(scene.poses, pass_notes);
 }
 
 // The error that there was, or nothing, and then the scene.

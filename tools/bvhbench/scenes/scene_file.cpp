@@ -45,6 +45,7 @@ SceneFilter read_filter(const Hdf5Input& file, const std::string& path, std::siz
   SceneFilter filter;
   filter.group = of_each("/instances/group");
   filter.mask = of_each("/instances/mask");
+  filter.world = of_each("/instances/world");
   for (const std::uint32_t motion : of_each("/simulation/motion")) {
     if (motion > static_cast<std::uint32_t>(Motion::sleeping)) {
       throw FileError(path + ": /simulation/motion: instance " + std::to_string(filter.motion.size()) + ": " +
@@ -124,7 +125,7 @@ MappedAsset open_asset(const std::string& scene, const std::vector<std::string>&
 PairFilter SceneFilter::view(ExcludedPairTable& table) const {
   if (table.set(excluded) != Status::kOk) throw std::bad_alloc();
   const auto of_each = [](const auto& values) { return values.empty() ? nullptr : values.data(); };
-  return {of_each(motion), of_each(group), of_each(mask), table.view()};
+  return {of_each(motion), of_each(group), of_each(mask), of_each(world), table.view()};
 }
 
 void LoadedScene::add(MappedAsset asset) {
@@ -215,6 +216,7 @@ void add_filter(Hdf5Output& file, const SceneFilter& filter) {
   for (const Motion of_each : filter.motion) motion.push_back(static_cast<std::uint32_t>(of_each));
   add("/instances/group", filter.group);
   add("/instances/mask", filter.mask);
+  add("/instances/world", filter.world);
   add("/simulation/motion", motion);
   if (!filter.excluded.empty()) add_pairs(file, "/excluded", filter.excluded);
 }

@@ -28,7 +28,7 @@ struct PoseNotes {
 /// none where the file has no such dataset.
 struct SceneFilter {
   std::vector<Motion> motion;
-  std::vector<std::uint32_t> group, mask;
+  std::vector<std::uint32_t> group, mask, world;
   std::vector<ObjectPair> excluded;
 
   /// Returns the filter as queries take it. `table` is made to own the excluded pairs. Throws std::bad_alloc.

@@ -268,7 +268,7 @@ std::uint64_t hash_of(std::span<const BodyProperties> bodies, std::span<const Bo
   const auto add = [&hash](std::uint64_t kind, const auto& values) {
     if (!values.empty()) hash = xxh64(values.data(), values.size() * sizeof values[0], hash + kind);
   };
-  add(1, filter.group), add(2, filter.mask), add(3, filter.excluded);
+  add(1, filter.group), add(2, filter.mask), add(3, filter.excluded), add(4, filter.world);
   return hash;
 }
 

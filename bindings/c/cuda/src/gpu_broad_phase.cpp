@@ -54,15 +54,15 @@ tandem_status tandem_gpu_broad_phase_reserve(tandem_gpu_broad_phase* broad_phase
 
 tandem_status tandem_gpu_broad_phase_keep_fixed(tandem_gpu_broad_phase* broad_phase,
                                                 const tandem_gpu_instances* instances, const uint8_t* motion,
-                                                tandem_stream stream) {
+                                                const uint32_t* world, tandem_stream stream) {
   return with_assets(broad_phase, [&](tandem_gpu_broad_phase& self) -> tandem_status {
     GpuInstances read;
     if (const tandem_status status = read_instances(instances, read); status != TANDEM_OK) return status;
     if (!is_there(motion, read.count)) return TANDEM_NULL_ARGUMENT;
     if (first_unknown_motion(motion, read.count) != read.count) return TANDEM_BAD_MOTION;
-    return told(
-        self.query.keep_fixed(read, self.assets->bounds_of_all(), rows<Motion>(motion, read.count), stream),
-        self.query);
+    return told(self.query.keep_fixed(read, self.assets->bounds_of_all(), rows<Motion>(motion, read.count),
+                                      world, stream),
+                self.query);
   });
 }
 

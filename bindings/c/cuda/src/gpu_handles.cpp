@@ -43,6 +43,7 @@ tandem_status read_gpu_filter(const tandem_gpu_pair_filter* given, PairFilter& f
   filter.motion = reinterpret_cast<const Motion*>(read.motion);
   filter.group = read.group;
   filter.mask = read.mask;
+  filter.world = read.world;
   filter.excluded = read.excluded != nullptr ? read.excluded->table.view() : ExcludedPairs();
   return TANDEM_OK;
 }

@@ -347,15 +347,20 @@ TANDEM_API tandem_status tandem_excluded_pairs_create(const tandem_object_pair* 
 /// Destroys the handle; null does nothing.
 TANDEM_API void tandem_excluded_pairs_destroy(tandem_excluded_pairs* excluded);
 
+/// The world of a body that is in all worlds.
+#define TANDEM_EVERY_WORLD UINT32_MAX
+
 /// Says which pairs a scene looks at (docs/queries.md). Arrays have `count` entries, one for each body
 /// (TANDEM_FILTER_MISMATCH where there are others), or are null. The scene copies them.
 typedef struct tandem_pair_filter {
   uint32_t struct_size;
   uint32_t reserved;
   size_t count;
-  const uint8_t* motion;                  ///< TANDEM_MOVING, ...; null: all move
-  const uint32_t* group;                  ///< the groups that a body is in, a bit each; null: all
-  const uint32_t* mask;                   ///< the groups that it meets; null: all
+  const uint8_t* motion;  ///< TANDEM_MOVING, ...; null: all move
+  const uint32_t* group;  ///< the groups that a body is in, a bit each; null: all
+  const uint32_t* mask;   ///< the groups that it meets; null: all
+  const uint32_t* world;  ///< only bodies of one world meet; TANDEM_EVERY_WORLD: a body of all;
+                          ///< null: there is one world
   const tandem_excluded_pairs* excluded;  ///< or null
 } tandem_pair_filter;
 

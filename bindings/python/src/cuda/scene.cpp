@@ -68,8 +68,8 @@ Pairs::Pairs(nb::handle pairs, const Stream& stream, int device) : given_(pairs,
   pairs_.capacity = count_of(shape[0], given_);
 }
 
-GpuFilter::GpuFilter(nb::handle motion, nb::handle group, nb::handle mask, nb::handle excluded,
-                     const Stream& stream, int device)
+GpuFilter::GpuFilter(nb::handle motion, nb::handle group, nb::handle mask, nb::handle world,
+                     nb::handle excluded, const Stream& stream, int device)
     : device_(device) {
   filter_.struct_size = sizeof filter_;
   const auto take = [&](nb::handle given, const char* name, GivenArray& array,
@@ -83,10 +83,12 @@ GpuFilter::GpuFilter(nb::handle motion, nb::handle group, nb::handle mask, nb::h
     return array.data();
   };
   filter_.motion = static_cast<const std::uint8_t*>(take(motion, "motion", motion_, {kU8}, "uint8"));
-  filter_.group =
-      static_cast<const std::uint32_t*>(take(group, "group", group_, {kU32, kI32}, "uint32 or int32"));
-  filter_.mask =
-      static_cast<const std::uint32_t*>(take(mask, "mask", mask_, {kU32, kI32}, "uint32 or int32"));
+  const auto take_words = [&](nb::handle given, const char* name, GivenArray& array) {
+    return static_cast<const std::uint32_t*>(take(given, name, array, {kU32, kI32}, "uint32 or int32"));
+  };
+  filter_.group = take_words(group, "group", group_);
+  filter_.mask = take_words(mask, "mask", mask_);
+  filter_.world = take_words(world, "world", world_);
   if (excluded.is_none()) return;
   const auto pairs = copy_rows<tandem_object_pair>(excluded);
   const OnDevice current(device);
@@ -117,8 +119,9 @@ void add_scenes(nb::module_& module) {
       .def(nb::init<nb::handle, const Stream&, int>())
       .def("__len__", &Pairs::count);
   nb::class_<GpuFilter>(module, "Filter")
-      .def(nb::init<nb::handle, nb::handle, nb::handle, nb::handle, const Stream&, int>(), nb::arg().none(),
-           nb::arg().none(), nb::arg().none(), nb::arg().none(), nb::arg(), nb::arg());
+      .def(nb::init<nb::handle, nb::handle, nb::handle, nb::handle, nb::handle, const Stream&, int>(),
+           nb::arg().none(), nb::arg().none(), nb::arg().none(), nb::arg().none(), nb::arg().none(),
+           nb::arg(), nb::arg());
 }
 
 }  // namespace tandem::python

@@ -74,8 +74,8 @@ class Pairs {
 /// Says which pairs a query looks at. Its arrays are read where they are.
 class GpuFilter {
  public:
-  GpuFilter(nb::handle motion, nb::handle group, nb::handle mask, nb::handle excluded, const Stream& stream,
-            int device);
+  GpuFilter(nb::handle motion, nb::handle group, nb::handle mask, nb::handle world, nb::handle excluded,
+            const Stream& stream, int device);
   ~GpuFilter() { tandem_gpu_excluded_pairs_destroy(excluded_); }
   GpuFilter(const GpuFilter&) = delete;
   GpuFilter& operator=(const GpuFilter&) = delete;
@@ -84,7 +84,7 @@ class GpuFilter {
   static const tandem_gpu_pair_filter* of(const GpuFilter* filter, const Instances& bodies);
 
  private:
-  GivenArray motion_, group_, mask_;
+  GivenArray motion_, group_, mask_, world_;
   tandem_gpu_excluded_pairs* excluded_ = nullptr;
   tandem_gpu_pair_filter filter_ = {};
   std::int64_t count_ = -1;  // any

@@ -21,9 +21,10 @@ class WorkerThreads;
 /// tree of groups of four; it is traversed in tandem with itself. O(n log n) for boxes of bounded overlap,
 /// whatever their distribution: one that is far from all others costs no more than the rest. All in float64,
 /// so that the tree's answer is exact. Where the filter tells instances apart, each group knows the groups,
-/// masks and motions that are in it, so a pair of groups of which the filter looks at no pair ends the walk,
-/// and boxes in one place are split by these. Boxes of fixed instances may be kept in a tree of their own:
-/// then a call makes one of the others, and traverses that in tandem with itself and with the kept one.
+/// masks, motions and worlds that are in it, so a pair of groups of which the filter looks at no pair ends
+/// the walk, and boxes in one place are split by these. Boxes of several worlds are split by world first.
+/// Boxes of fixed instances may be kept in a tree of their own: then a call makes one of the others, and
+/// traverses that in tandem with itself and with the kept one.
 class BroadPhase {
  public:
   /// Result: kOk; kOutOfMemory; kOutOfRange where a coordinate is NaN or beyond kLargestWorldCoordinate;
@@ -40,11 +41,13 @@ class BroadPhase {
 
   /// Keeps the boxes whose motion is fixed for the calls to come, which must be of as many boxes: they find
   /// no pair of two kept ones, and look at no kept box again; it is where it was, and the filter still says
-  /// that it is fixed. A later call replaces what is kept. motion: of each box. Result: as of find_pairs();
-  /// kKeptMismatch where the sizes differ. After an error nothing is kept.
-  Status keep_fixed(std::span<const WorldBox> boxes, std::span<const Motion> motion);
-  Status keep_fixed(std::span<const WorldBox> boxes, std::span<const Motion> motion, WorkerThreads& threads,
-                    std::uint32_t workers);
+  /// that it is fixed, and in the same world. A later call replaces what is kept. motion, world: of each box;
+  /// world is null where the filter has none. Result: as of find_pairs(); kKeptMismatch where the sizes
+  /// differ. After an error nothing is kept.
+  Status keep_fixed(std::span<const WorldBox> boxes, std::span<const Motion> motion,
+                    const std::uint32_t* world = nullptr);
+  Status keep_fixed(std::span<const WorldBox> boxes, std::span<const Motion> motion,
+                    const std::uint32_t* world, WorkerThreads& threads, std::uint32_t workers);
 
   void forget_fixed();
 
@@ -70,7 +73,7 @@ class BroadPhase {
   /// A box on its way to its place in the tree.
   struct Item {
     double centre[3];
-    std::uint32_t box;
+    std::uint32_t box, world;
   };
 
   /// Four boxes, or the boxes of four groups; where there are fewer, the others are empty, [inf, -inf].
@@ -78,12 +81,15 @@ class BroadPhase {
     double lo[3][kGroup], hi[3][kGroup];
   };
 
-  /// What a filter says of a box, or of all boxes of a group together: their groups and masks, and a bit for
-  /// each of their motions and for each that meets one of these.
+  /// What a filter says of a box, or of all boxes of a group together: their groups and masks, a bit for
+  /// each of their motions and for each that meets one of these, and their worlds.
   struct Kind {
     std::uint32_t group = 0, mask = 0, motions = 0, met = 0;
+    WorldRange worlds;
 
-    auto operator<=>(const Kind&) const = default;
+    bool before(const Kind& other) const;
+    void add(const Kind& more);
+    bool may_look_at(const Kind& other) const;
   };
   struct Kinds {
     Kind of[kGroup];
@@ -106,6 +112,7 @@ class BroadPhase {
     bool reserve(std::size_t boxes, const PairFilter& filter);
     int top() const { return levels - 1; }
     const Group* level(int i) const { return groups.data() + level_begin[i]; }
+    const Kinds* kinds_of(int i) const { return kinds.data() + level_begin[i]; }
   };
 
   /// The trees that are traversed in tandem: the same one twice, or two.
@@ -139,7 +146,8 @@ class BroadPhase {
   static std::uint32_t meeting(const TreePair& trees, const GroupPair& pair);
   static Kind kind_of(const PairFilter& filter, std::size_t box);
   static std::uint32_t may_look(const TreePair& trees, const GroupPair& pair);
-  bool take(std::span<const WorldBox> boxes, const std::uint32_t* numbers, Tree& tree, Team team);
+  bool take(std::span<const WorldBox> boxes, const std::uint32_t* world, const std::uint32_t* numbers,
+            Tree& tree, Team team);
   static bool halve(Item* all, const PairFilter& filter, Range& range, Range& right);
   static void split(Item* all, const PairFilter& filter, Range range);
   static void split(Item* all, const PairFilter& filter, Range range, Team team);

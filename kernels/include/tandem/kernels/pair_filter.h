@@ -28,6 +28,28 @@ TANDEM_HD inline bool groups_meet(std::uint32_t group_a, std::uint32_t mask_a, s
   return (group_a & mask_b) != 0 && (group_b & mask_a) != 0;
 }
 
+/// The world of an instance that is in all worlds.
+inline constexpr std::uint32_t kEveryWorld = ~std::uint32_t{0};
+
+/// Returns whether two instances are in one world.
+TANDEM_HD inline bool worlds_meet(std::uint32_t a, std::uint32_t b) {
+  return a == b || a == kEveryWorld || b == kEveryWorld;
+}
+
+/// The lowest and the highest world of some instances.
+struct WorldRange {
+  std::uint32_t first = kEveryWorld, last = 0;  ///< of none: first > last
+
+  TANDEM_HD static WorldRange of(std::uint32_t world) {
+    return world == kEveryWorld ? WorldRange{0, kEveryWorld} : WorldRange{world, world};
+  }
+  TANDEM_HD void add(const WorldRange& more) {
+    first = more.first < first ? more.first : first;
+    last = more.last > last ? more.last : last;
+  }
+  TANDEM_HD bool meets(const WorldRange& other) const { return first <= other.last && other.first <= last; }
+};
+
 /// A set of pairs of instances: a table that ExcludedPairTable or GpuExcludedPairs owns. Owns nothing.
 struct ExcludedPairs {
   static constexpr std::uint64_t kEmpty = ~std::uint64_t{0};
@@ -69,10 +91,14 @@ struct PairFilter {
   const Motion* motion = nullptr;        ///< null: all move
   const std::uint32_t* group = nullptr;  ///< the groups that an instance is in, a bit each; null: all
   const std::uint32_t* mask = nullptr;   ///< the groups that it meets; null: all
+  const std::uint32_t* world = nullptr;  ///< only those of one world meet, and those of kEveryWorld all;
+                                         ///< null: there is one world. Broad phases sort by it, so that
+                                         ///< worlds that lie in one place cost what worlds far apart do
   ExcludedPairs excluded = {};           ///< such as bodies that a joint connects
 
   /// The rule; a == b: an instance with itself.
   TANDEM_HD bool looks_at(std::uint32_t a, std::uint32_t b) const {
+    if (world != nullptr && !worlds_meet(world[a], world[b])) return false;
     if (motion != nullptr && !motions_meet(motion[a], motion[b])) return false;
     const auto bits = [](const std::uint32_t* of, std::uint32_t i) { return of != nullptr ? of[i] : ~0u; };
     return groups_meet(bits(group, a), bits(mask, a), bits(group, b), bits(mask, b)) &&

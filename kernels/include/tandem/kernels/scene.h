@@ -23,6 +23,7 @@ struct Instance {
 struct BodyFilter {
   Motion motion = Motion::moving;
   std::uint32_t group = ~std::uint32_t{0}, mask = ~std::uint32_t{0};
+  std::uint32_t world = kEveryWorld;
 };
 
 inline constexpr std::uint32_t kMostSceneThreads = 1024;

@@ -116,6 +116,7 @@ typedef struct tandem_gpu_pair_filter {
   const uint8_t* motion;
   const uint32_t* group;
   const uint32_t* mask;
+  const uint32_t* world;
   const tandem_gpu_excluded_pairs* excluded;
 } tandem_gpu_pair_filter;
 
@@ -154,11 +155,13 @@ TANDEM_API tandem_status tandem_gpu_broad_phase_reserve(tandem_gpu_broad_phase* 
                                                         const tandem_gpu_broad_phase_capacity* capacity,
                                                         const tandem_gpu_broad_phase_options* options);
 /// Keeps the instances whose motion is TANDEM_FIXED as they stand, and waits: calls to come take the time of
-/// the others. motion: instances->count entries, in CPU memory. Room for more instances forgets what was
+/// the others. motion: instances->count entries, in CPU memory; world: as many, in GPU memory, or null where
+/// the filters of the calls have none. Room for more instances forgets what was
 /// kept, and calls return TANDEM_KEPT_MISMATCH then. Result: as of find().
 TANDEM_API tandem_status tandem_gpu_broad_phase_keep_fixed(tandem_gpu_broad_phase* broad_phase,
                                                            const tandem_gpu_instances* instances,
-                                                           const uint8_t* motion, tandem_stream stream);
+                                                           const uint8_t* motion, const uint32_t* world,
+                                                           tandem_stream stream);
 /// Result: TANDEM_OUT_OF_RANGE where less was reserved, or without these options; TANDEM_BAD_REACH where
 /// `within` is negative or NaN; TANDEM_UNKNOWN_INSTANCE: an excluded pair names one that there is not;
 /// TANDEM_KEPT_MISMATCH.

@@ -52,11 +52,12 @@ extern template class GpuQuestion<GpuBroadPhaseCapacity, GpuBroadPhaseReport, Gp
 /// Finds all pairs of world boxes that meet, or those of them that a filter looks at, on the GPU: the same
 /// set as BroadPhase. See GpuQuestion.
 ///
-/// Few boxes are tested each against each, by one kernel that poses them too. Many are sorted by class of
-/// size, then along a space-filling curve, and grouped by 32 into a tree of fan-out 32. One warp takes a
-/// group and walks the part of the tree that lies behind it, so a pair is found once, by the smaller box: one
-/// huge box among many small ones costs each of them a test. O(n log n) for boxes of bounded overlap. Boxes
-/// of fixed instances may be kept in a tree of their own, which a warp walks for each of the others.
+/// Few boxes are tested each against each, by one kernel that poses them too. Many are sorted by world where
+/// there are several, by class of size, then along a space-filling curve, and grouped by 32 into a tree of
+/// fan-out 32. One warp takes a group and walks the part of the tree that lies behind it, so a pair is found
+/// once, by the smaller box: one huge box among many small ones costs each of them a test. O(n log n) for
+/// boxes of bounded overlap. Boxes of fixed instances may be kept in a tree of their own, which a warp walks
+/// for each of the others.
 ///
 /// reserve() also returns kOutOfRange for 2^32 - 1 boxes, and what status_of() of gpu_status.h names: kNoGpu,
 /// kDriverTooOld, kGpuNotSupported. Where it makes room for more instances, what was kept of them is lost,
@@ -69,13 +70,15 @@ class GpuBroadPhase : public GpuQuestion<GpuBroadPhaseCapacity, GpuBroadPhaseRep
   /// in the array that enqueue() gets; assets and poses of kept instances are not looked at again. Call it
   /// again when one of them has moved or others are fixed; nothing is kept where none is fixed. Makes room
   /// for all that and waits for the stream: it is no part of a step, and graphs that were captured before it
-  /// must be captured anew. motion: of each, in CPU memory; where a filter of a call to come has motions, it
-  /// says the same of what is kept. Result: as of reserve(); kMisaligned; kKeptMismatch where the sizes
+  /// must be captured anew. motion: of each, in CPU memory; world: of each, in GPU memory, or null where the
+  /// filters have none. Where a filter of a call to come has motions or worlds, it says the same of what is
+  /// kept. Result: as of reserve(); kMisaligned; kKeptMismatch where the sizes
   /// differ; or kOutOfRange, kUnknownAsset, kPoseNotRigid, where report().where is the fixed one to blame.
   /// After an error nothing is kept.
-  Status keep_fixed(const WorldBox* boxes, std::span<const Motion> motion, cudaStream_t stream);
+  Status keep_fixed(const WorldBox* boxes, std::span<const Motion> motion, const std::uint32_t* world,
+                    cudaStream_t stream);
   Status keep_fixed(const GpuInstances& instances, const GpuAssetBounds& assets,
-                    std::span<const Motion> motion, cudaStream_t stream);
+                    std::span<const Motion> motion, const std::uint32_t* world, cudaStream_t stream);
 
   /// Queues a broad phase of the boxes behind what `stream` holds. They lie in GPU memory at a multiple of 16
   /// bytes. Result: also kMisaligned, kOutOfRange (more than reserved for), kBadReach (`within` negative or

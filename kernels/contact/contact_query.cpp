@@ -4,6 +4,7 @@
 
 #include "kernels/common/block_pair.h"
 #include "kernels/common/check_options.h"
+#include "kernels/contact/first_contact.h"
 #include "kernels/contact/neighbour_lists.h"
 #include "kernels/geometry/level_error.h"
 #include "tandem/kernels/contact_query.h"
@@ -49,13 +50,9 @@ PairTask ContactFinder::task_of(std::uint32_t pair) const {
   const PosedTree &a = trees_[pairs_[pair].a], &b = trees_[pairs_[pair].b];
   double within = options_.within;
   if (options_.add_error_bounds && &a != &b) within = clearance_of_levels(within, a.error, b.error);
-  PairTask task = pair_task(a, b, within);
+  PairTask task = options_.first_contact_only ? first_contact_task(a, b, within) : pair_task(a, b, within);
   task.pair = pair;
   task.mode = options_.mode;
-  task.first_contact_only = options_.first_contact_only;
-  if (task.first_contact_only && task.in_frame && !task.self && task.within > 0)
-    task.most_candidates =
-        std::max(kLeastBeforeGivingUp, std::uint64_t{a.tree.triangle_count} + b.tree.triangle_count);
   return task;
 }
 
@@ -80,9 +77,7 @@ void ContactFinder::work(std::uint32_t worker) {
       if constexpr (kWithoutNeighbours) {
         if (task.self) task.neighbours = &neighbours_[pairs_[pair].a];
       }
-      sink.gave_up = false;
-      self.enough_memory = (task.in_frame ? narrow_phase_ : narrow_phase_by_world_boxes)(task, sink);
-      if (sink.gave_up) self.enough_memory = find_first_within(task, sink, self.waiting);
+      self.enough_memory = run_contact_task(task, narrow_phase_, sink, self.waiting);
     }
     chunks_[chunk] = {worker, begin, used(), 0};
   }

@@ -205,16 +205,24 @@ bool SceneState::reserve_bodies(std::size_t count) {
   return instances.resize(count) && bodies.resize(count) && boxes.resize(count) && changed_.resize(count);
 }
 
-// A body's tree, pose of stored coordinates and world box. After an error nothing has changed.
-Status SceneState::pose(std::uint32_t body, const Instance& instance) {
+Status SceneState::posed(const Instance& instance, PosedTree& tree, WorldBox& box) const {
   Pose stored;
-  WorldBox box;
   const Status status = pose_instance(assets.data(), static_cast<std::uint32_t>(assets.size()),
                                       instance.asset, instance.pose, stored, box);
   if (status != Status::kOk) return status;
   const SceneAsset& asset = assets[instance.asset];
-  bodies[body] = {asset.tree, asset.extent, asset.grid, stored,
-                  posed_level_error(asset.tree, asset.lower, asset.upper, stored)};
+  tree = {asset.tree, asset.extent, asset.grid, stored,
+          posed_level_error(asset.tree, asset.lower, asset.upper, stored)};
+  return Status::kOk;
+}
+
+// A body's tree, pose of stored coordinates and world box. After an error nothing has changed.
+Status SceneState::pose(std::uint32_t body, const Instance& instance) {
+  PosedTree tree;
+  WorldBox box;
+  const Status status = posed(instance, tree, box);
+  if (status != Status::kOk) return status;
+  bodies[body] = tree;
   boxes[body] = box;
   instances[body] = instance;
   return Status::kOk;

@@ -107,6 +107,10 @@ struct SceneState : Allocated {
   }
 
   bool is_body(std::uint32_t i) const { return i < instances.size() && instances[i].asset != kNoIndex; }
+  /// An instance as the walks of trees see it, and its world box. Result: kOk, kUnknownAsset, kPoseNotRigid
+  /// or kOutOfRange.
+  Status posed(const Instance& instance, PosedTree& tree, WorldBox& box) const;
+
   const SceneAsset& asset_of(std::uint32_t body) const { return assets[instances[body].asset]; }
 
   ~SceneState() { forget_assets(); }

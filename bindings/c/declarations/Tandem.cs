@@ -163,6 +163,7 @@ public unsafe struct tandem_pair_filter {
   public byte* motion;
   public uint* group;
   public uint* mask;
+  public uint* world;
   public IntPtr excluded;
 }
 
@@ -410,6 +411,32 @@ public unsafe struct tandem_body_at {
 }
 
 [StructLayout(LayoutKind.Sequential)]
+public unsafe struct tandem_configuration_options {
+  public uint struct_size;
+  public uint all_pairs;
+  public uint* bodies;
+  public UIntPtr body_count;
+  public tandem_pose* poses;
+  public UIntPtr pose_count;
+  public double within;
+}
+
+[StructLayout(LayoutKind.Sequential)]
+public unsafe struct tandem_configuration_pair {
+  public uint configuration;
+  public uint a;
+  public uint b;
+}
+
+[StructLayout(LayoutKind.Sequential)]
+public unsafe struct tandem_configuration_counters {
+  public ulong configurations;
+  public ulong touching;
+  public ulong object_pairs;
+  public ulong block_pairs;
+}
+
+[StructLayout(LayoutKind.Sequential)]
 public unsafe struct tandem_questions {
   public uint struct_size;
   public uint contained;
@@ -420,6 +447,7 @@ public unsafe struct tandem_questions {
   public tandem_impact_options* impacts;
   public tandem_tolerance_options* verdicts;
   public tandem_bodies_at_options* bodies_at;
+  public tandem_configuration_options* configurations;
 }
 
 [StructLayout(LayoutKind.Sequential)]
@@ -433,6 +461,7 @@ public unsafe struct tandem_counters {
   public tandem_impact_counters impacts;
   public tandem_tolerance_counters verdicts;
   public tandem_moved_counters moved;
+  public tandem_configuration_counters configurations;
 }
 
 [StructLayout(LayoutKind.Sequential)]
@@ -672,6 +701,7 @@ public static unsafe class Native {
   public const uint TANDEM_VERSION_MINOR = 1;
   public const uint TANDEM_VERSION_PATCH = 0;
   public const uint TANDEM_NO_INDEX = 4294967295;
+  public const uint TANDEM_EVERY_WORLD = 4294967295;
   [DllImport("tandem")] public static extern uint tandem_version();
   [DllImport("tandem")] public static extern byte* tandem_status_name(uint status);
   [DllImport("tandem")] public static extern byte* tandem_status_explain(uint status);
@@ -726,6 +756,8 @@ public static unsafe class Native {
   [DllImport("tandem")] public static extern tandem_verdict* tandem_scene_verdicts(IntPtr scene, UIntPtr* count);
   [DllImport("tandem")] public static extern uint tandem_scene_find_bodies_at(IntPtr scene, tandem_bodies_at_options* options);
   [DllImport("tandem")] public static extern tandem_body_at* tandem_scene_bodies_at(IntPtr scene, UIntPtr* count);
+  [DllImport("tandem")] public static extern uint tandem_scene_find_configurations(IntPtr scene, tandem_configuration_options* options);
+  [DllImport("tandem")] public static extern tandem_configuration_pair* tandem_scene_configurations(IntPtr scene, UIntPtr* count);
   [DllImport("tandem")] public static extern uint tandem_scene_find(IntPtr scene, tandem_questions* questions);
   [DllImport("tandem")] public static extern uint tandem_scene_get_counters(IntPtr scene, tandem_counters* counters);
   [DllImport("tandem")] public static extern uint tandem_world_create(tandem_world_options* options, tandem_allocator* allocator, IntPtr* world);

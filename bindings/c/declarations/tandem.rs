@@ -145,6 +145,7 @@ pub const TANDEM_VERSION_MAJOR: u32 = 0;
 pub const TANDEM_VERSION_MINOR: u32 = 1;
 pub const TANDEM_VERSION_PATCH: u32 = 0;
 pub const TANDEM_NO_INDEX: u32 = 4294967295;
+pub const TANDEM_EVERY_WORLD: u32 = 4294967295;
 
 #[repr(C)]
 pub struct tandem_asset {
@@ -350,6 +351,7 @@ pub struct tandem_pair_filter {
     pub motion: *const u8,
     pub group: *const u32,
     pub mask: *const u32,
+    pub world: *const u32,
     pub excluded: *const tandem_excluded_pairs,
 }
 
@@ -623,6 +625,35 @@ pub struct tandem_body_at {
 
 #[repr(C)]
 #[derive(Clone, Copy)]
+pub struct tandem_configuration_options {
+    pub struct_size: u32,
+    pub all_pairs: u32,
+    pub bodies: *const u32,
+    pub body_count: usize,
+    pub poses: *const tandem_pose,
+    pub pose_count: usize,
+    pub within: f64,
+}
+
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct tandem_configuration_pair {
+    pub configuration: u32,
+    pub a: u32,
+    pub b: u32,
+}
+
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct tandem_configuration_counters {
+    pub configurations: u64,
+    pub touching: u64,
+    pub object_pairs: u64,
+    pub block_pairs: u64,
+}
+
+#[repr(C)]
+#[derive(Clone, Copy)]
 pub struct tandem_questions {
     pub struct_size: u32,
     pub contained: u32,
@@ -633,6 +664,7 @@ pub struct tandem_questions {
     pub impacts: *const tandem_impact_options,
     pub verdicts: *const tandem_tolerance_options,
     pub bodies_at: *const tandem_bodies_at_options,
+    pub configurations: *const tandem_configuration_options,
 }
 
 #[repr(C)]
@@ -647,6 +679,7 @@ pub struct tandem_counters {
     pub impacts: tandem_impact_counters,
     pub verdicts: tandem_tolerance_counters,
     pub moved: tandem_moved_counters,
+    pub configurations: tandem_configuration_counters,
 }
 
 #[repr(C)]
@@ -806,6 +839,8 @@ extern "C" {
     pub fn tandem_scene_verdicts(scene: *const tandem_scene, count: *mut usize) -> *const tandem_verdict;
     pub fn tandem_scene_find_bodies_at(scene: *mut tandem_scene, options: *const tandem_bodies_at_options) -> tandem_status;
     pub fn tandem_scene_bodies_at(scene: *const tandem_scene, count: *mut usize) -> *const tandem_body_at;
+    pub fn tandem_scene_find_configurations(scene: *mut tandem_scene, options: *const tandem_configuration_options) -> tandem_status;
+    pub fn tandem_scene_configurations(scene: *const tandem_scene, count: *mut usize) -> *const tandem_configuration_pair;
     pub fn tandem_scene_find(scene: *mut tandem_scene, questions: *const tandem_questions) -> tandem_status;
     pub fn tandem_scene_get_counters(scene: *const tandem_scene, counters: *mut tandem_counters) -> tandem_status;
     pub fn tandem_world_create(options: *const tandem_world_options, allocator: *const tandem_allocator, world: *mut *mut tandem_world) -> tandem_status;

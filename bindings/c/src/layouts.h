@@ -44,6 +44,10 @@ struct Same_tandem_verdict { using Ours = PairVerdict; using Theirs = tandem_ver
 struct Same_tandem_tolerance_counters { using Ours = ToleranceCounters; using Theirs = tandem_tolerance_counters; TANDEM_SAME_SIZE();
   TANDEM_SAME(apart); TANDEM_SAME(touching); TANDEM_SAME(within_tolerance); TANDEM_SAME(work); };
 struct Same_tandem_body_at { using Ours = BodyAt; using Theirs = tandem_body_at; TANDEM_SAME_SIZE(); TANDEM_SAME(point); TANDEM_SAME(body); };
+struct Same_tandem_configuration_pair { using Ours = ConfigurationPair; using Theirs = tandem_configuration_pair; TANDEM_SAME_SIZE();
+  TANDEM_SAME(configuration); TANDEM_SAME(a); TANDEM_SAME(b); };
+struct Same_tandem_configuration_counters { using Ours = ConfigurationCounters; using Theirs = tandem_configuration_counters; TANDEM_SAME_SIZE();
+  TANDEM_SAME(configurations); TANDEM_SAME(touching); TANDEM_SAME(object_pairs); TANDEM_SAME(block_pairs); };
 struct Same_tandem_body_motion { using Ours = BodyMotion; using Theirs = tandem_body_motion; TANDEM_SAME_SIZE(); TANDEM_SAME(pose);
   TANDEM_SAME(centre); TANDEM_SAME(velocity); TANDEM_SAME(angular_velocity); TANDEM_SAME(sleeps); };
 struct Same_tandem_world_contact { using Ours = WorldContact; using Theirs = tandem_world_contact; TANDEM_SAME_SIZE(); TANDEM_SAME(a); TANDEM_SAME(b);

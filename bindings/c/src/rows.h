@@ -5,6 +5,7 @@
 #include "entry.h"
 #include "tandem/dynamics/world.h"
 #include "tandem/kernels/bodies_at_query.h"
+#include "tandem/kernels/configuration_query.h"
 #include "tandem/kernels/containment_query.h"
 #include "tandem/kernels/distance_query.h"
 #include "tandem/kernels/impact_query.h"

@@ -41,6 +41,7 @@ struct tandem_scene : Allocated {
   Asked<ImpactQuery> impacts;
   Asked<ToleranceQuery> verdicts;
   Asked<BodiesAtQuery> bodies_at;
+  Asked<ConfigurationQuery> configurations;
 
   ~tandem_scene() { keep(nullptr); }
 
@@ -139,6 +140,17 @@ tandem_status read_options(const tandem_bodies_at_options& given, BodiesAtOption
   if (given.reserved != 0) return TANDEM_BAD_OPTION;
   if (!is_there(given.points, given.point_count)) return TANDEM_NULL_ARGUMENT;
   options.points = {reinterpret_cast<const std::array<double, 3>*>(given.points), given.point_count};
+  return TANDEM_OK;
+}
+
+tandem_status read_options(const tandem_configuration_options& given, ConfigurationOptions& options) {
+  if (given.all_pairs > 1) return TANDEM_BAD_OPTION;
+  if (!is_there(given.bodies, given.body_count) || !is_there(given.poses, given.pose_count))
+    return TANDEM_NULL_ARGUMENT;
+  options.bodies = {given.bodies, given.body_count};
+  options.poses = rows<Pose>(given.poses, given.pose_count);
+  options.within = given.within;
+  options.all_pairs = given.all_pairs != 0;
   return TANDEM_OK;
 }
 
@@ -257,7 +269,7 @@ tandem_status tandem_scene_set_assets(tandem_scene* scene, tandem_asset* const* 
   return enter(scene, [&](tandem_scene& self) {
     self.forget_contacts();
     self.pairs_found = self.moved.found = self.distances.found = self.impacts.found = self.verdicts.found =
-        self.bodies_at.found = false;
+        self.bodies_at.found = self.configurations.found = false;
     // Points of before are not those of other assets.
     self.manifolds.query.forget_points();
     const tandem_status status = self.assets.replace(
@@ -429,6 +441,7 @@ TANDEM_SCENE_QUESTION(distances, tandem_distance_options, tandem_distance)
 TANDEM_SCENE_QUESTION(impacts, tandem_impact_options, tandem_impact)
 TANDEM_SCENE_QUESTION(verdicts, tandem_tolerance_options, tandem_verdict)
 TANDEM_SCENE_QUESTION(bodies_at, tandem_bodies_at_options, tandem_body_at)
+TANDEM_SCENE_QUESTION(configurations, tandem_configuration_options, tandem_configuration_pair)
 
 tandem_status tandem_scene_find(tandem_scene* scene, const tandem_questions* questions) {
   return enter(scene, [&](tandem_scene& self) -> tandem_status {
@@ -447,6 +460,7 @@ tandem_status tandem_scene_find(tandem_scene* scene, const tandem_questions* que
     ask(tandem_scene_find_impacts, read.impacts);
     ask(tandem_scene_find_verdicts, read.verdicts);
     ask(tandem_scene_find_bodies_at, read.bodies_at);
+    ask(tandem_scene_find_configurations, read.configurations);
     return status;
   });
 }
@@ -466,6 +480,7 @@ tandem_status tandem_scene_get_counters(const tandem_scene* scene, tandem_counte
   copy_counters(scene->impacts, filled.impacts);
   copy_counters(scene->verdicts, filled.verdicts);
   copy_counters(scene->moved, filled.moved);
+  copy_counters(scene->configurations, filled.configurations);
   return write_struct(filled, counters);
 }
 

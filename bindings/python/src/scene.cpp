@@ -72,9 +72,7 @@ class Scene {
 
   void move(nb::handle bodies, nb::handle instances) {
     const auto numbers = copy_rows<std::uint32_t>(bodies);
-    std::vector<tandem_pose> poses;
-    for (const tandem_instance& instance : copy_rows<tandem_instance>(instances))
-      poses.push_back(instance.pose);
+    const std::vector<tandem_pose> poses = poses_of(instances);
     if (poses.size() != numbers.size()) throw_broken_rows();
     change([&](tandem_scene* scene) {
       return tandem_scene_move(scene, numbers.data(), poses.data(), poses.size());
@@ -210,7 +208,28 @@ class Scene {
     return answer<tandem_scene_find_bodies_at, tandem_scene_bodies_at>(options);
   }
 
+  nb::object configurations(nb::handle bodies, nb::handle instances, double within, bool all_pairs) {
+    const Turn turn = take_turn();
+    const auto moving = copy_rows<std::uint32_t>(bodies);
+    const std::vector<tandem_pose> places = poses_of(instances);
+    auto options = sized<tandem_configuration_options>();
+    options.bodies = moving.data();
+    options.body_count = moving.size();
+    options.poses = places.data();
+    options.pose_count = places.size();
+    options.within = within;
+    options.all_pairs = all_pairs;
+    return answer<tandem_scene_find_configurations, tandem_scene_configurations>(options);
+  }
+
  private:
+  static std::vector<tandem_pose> poses_of(nb::handle instances) {
+    std::vector<tandem_pose> poses;
+    for (const tandem_instance& instance : copy_rows<tandem_instance>(instances))
+      poses.push_back(instance.pose);
+    return poses;
+  }
+
   // The scene takes one call at a time, whichever threads make them.
   Turn take_turn() { return Turn(busy_, "another thread is in a call of this scene"); }
 
@@ -288,7 +307,8 @@ void add_scenes(nb::module_& module) {
       .def("distances", &Scene::distances, none(), none(), nb::arg(), nb::arg(), none())
       .def("impacts", &Scene::impacts, nb::arg(), nb::arg(), none(), nb::arg())
       .def("verdicts", &Scene::verdicts, nb::arg(), none())
-      .def("bodies_at", &Scene::bodies_at);
+      .def("bodies_at", &Scene::bodies_at)
+      .def("configurations", &Scene::configurations);
 }
 
 }  // namespace tandem::python

@@ -12,9 +12,9 @@ from ._arrays import FARTHEST, FINITE, Rotations, Rows, amount, flag, floats, in
 from ._asset import Asset, _choice
 from ._errors import Error
 from ._poses import explained
-from ._rows import BODY_AT, CONTACT, CONTAINMENT, DISTANCE, FORMER, IMPACT, INSTANCE, MANIFOLD, MOTION, PAIR, POINT, VERDICT
+from ._rows import BODY_AT, CONFIGURATION_PAIR, CONTACT, CONTAINMENT, DISTANCE, FORMER, IMPACT, INSTANCE, MANIFOLD, MOTION, PAIR, POINT, VERDICT
 
-__all__ = ["Contacts", "Contained", "Counters", "Distances", "Filter", "Impacts", "Manifolds", "Moved", "Scene", "Verdicts"]
+__all__ = ["EVERY_WORLD", "Configurations", "Contacts", "Contained", "Counters", "Distances", "Filter", "Impacts", "Manifolds", "Moved", "Scene", "Verdicts"]
 
 _frombuffer = np.frombuffer
 _MODES = {"exact": 0, "fast": 1, "boxes": 2}
@@ -56,6 +56,13 @@ class Contacts(NamedTuple):
         meets[self.contacts["pair"]] = True
         touching: Rows = self.pairs[meets]
         return touching
+
+
+class Configurations(NamedTuple):
+    """Whether anything touches in each configuration, (k,) bool, and what does, array of CONFIGURATION_PAIR by ascending configuration."""
+
+    touching: npt.NDArray[np.bool_]
+    pairs: Rows
 
 
 class Moved(NamedTuple):
@@ -468,6 +475,36 @@ class Scene:
         """
         found, verdicts = self._core.verdicts(amount(tolerance, "tolerance", FARTHEST), pairs_of(pairs))
         return Verdicts(_frombuffer(found, PAIR), _frombuffer(verdicts, VERDICT))
+
+    def configurations(self, bodies: npt.ArrayLike, *, rotation: Rotations | None = None, translation: npt.ArrayLike | None = None,
+                       transform: npt.ArrayLike | None = None, within: float = 0.0, all_pairs: bool = False) -> Configurations:
+        """Asks of many configurations whether anything touches: the same, as exactly, as moving the bodies and asking for contacts in each, and many times faster.
+        The scene stays as it is. All its threads take part. Pairs of two bodies that stand are not looked at.
+
+        Args:
+            bodies: (n,), the numbers of the bodies that move, each once. All others stand where they are.
+            rotation, translation, transform: of these in each of k configurations (see `tandem.instances`): (k, n, 3, 3), (k, n, 3), (k, n, 4, 4) and so on.
+            within: bodies touch where their distance is at most this; 0: where they meet.
+            all_pairs: whether all pairs that touch are found, not only one for each configuration.
+
+        Raises:
+            Error: a pose that is not rigid or reaches too far; `where` is its place among all. A body that there is not; `where` is its place in `bodies`.
+
+        >>> found = scene.place(translation=[[0, 0, 0], [5, 0, 0]]).configurations([1], translation=[[[3, 0, 0]], [[0.5, 0, 0]]])
+        >>> found.touching.tolist(), found.pairs.tolist()
+        ([False, True], [(1, 0, 1)])
+        """
+        moving = np.atleast_1d(whole_numbers(bodies, "bodies"))
+        flat = [None if given is None else np.reshape(np.asarray(given), (-1, *np.shape(given)[2:])) for given in (rotation, translation, transform)]
+        poses = instances_of(None, None, *flat)
+        count = len(poses) // len(moving) if len(moving) else 0
+        try:
+            pairs = _frombuffer(self._core.configurations(moving, poses, amount(within, "within", FARTHEST), flag(all_pairs, "all_pairs")), CONFIGURATION_PAIR)
+        except Error as error:
+            raise explained(error, poses) from None
+        touching = np.zeros(count, bool)
+        touching[pairs["configuration"]] = True
+        return Configurations(touching, pairs)
 
     def bodies_at(self, points: npt.ArrayLike) -> Rows:
         """Finds which bodies' world boxes contain points, (n, 3) or one: array of BODY_AT by point, then by body.

@@ -348,7 +348,7 @@ TANDEM_API tandem_status tandem_excluded_pairs_create(const tandem_object_pair* 
 TANDEM_API void tandem_excluded_pairs_destroy(tandem_excluded_pairs* excluded);
 
 /// The world of a body that is in all worlds.
-#define TANDEM_EVERY_WORLD UINT32_MAX
+#define TANDEM_EVERY_WORLD 0xFFFFFFFFu
 
 /// Says which pairs a scene looks at (docs/queries.md). Arrays have `count` entries, one for each body
 /// (TANDEM_FILTER_MISMATCH where there are others), or are null. The scene copies them.
@@ -781,6 +781,40 @@ TANDEM_API tandem_status tandem_scene_find_bodies_at(tandem_scene* scene,
                                                      const tandem_bodies_at_options* options);
 TANDEM_API const tandem_body_at* tandem_scene_bodies_at(const tandem_scene* scene, size_t* count);
 
+/// ---- Configurations
+
+/// Poses of the bodies that move in each configuration, one configuration after the other: pose_count is a
+/// multiple of body_count.
+typedef struct tandem_configuration_options {
+  uint32_t struct_size;
+  uint32_t all_pairs;      ///< 1: all bodies that touch are found, 0: two for each configuration at most
+  const uint32_t* bodies;  ///< that move, each once; all others stand where they are
+  size_t body_count;
+  const tandem_pose* poses;
+  size_t pose_count;
+  double within;  ///< bodies touch where their distance is at most this
+} tandem_configuration_options;
+
+/// Two bodies that touch in a configuration; a < b.
+typedef struct tandem_configuration_pair {
+  uint32_t configuration;
+  uint32_t a, b;
+} tandem_configuration_pair;
+
+typedef struct tandem_configuration_counters {
+  uint64_t configurations, touching, object_pairs, block_pairs;
+} tandem_configuration_counters;
+
+/// Asks of many configurations of a scene whether anything touches. What stands is prepared once, and the
+/// scene stays as it is. Pairs of two bodies that stand are not looked at. Rows ascend by configuration.
+/// Result: TANDEM_UNKNOWN_INSTANCE, where `where` is the place in `bodies` of one that does not exist or
+/// stands there twice; TANDEM_MOTION_MISMATCH; TANDEM_BAD_REACH; TANDEM_POSE_NOT_RIGID or
+/// TANDEM_OUT_OF_RANGE, where `where` is the first such pose; TANDEM_BAD_OPTION where a device answers.
+TANDEM_API tandem_status tandem_scene_find_configurations(tandem_scene* scene,
+                                                          const tandem_configuration_options* options);
+TANDEM_API const tandem_configuration_pair* tandem_scene_configurations(const tandem_scene* scene,
+                                                                        size_t* count);
+
 /// ---- Several questions
 
 /// The questions that tandem_scene_find() asks. Null: the question is not asked.
@@ -794,6 +828,7 @@ typedef struct tandem_questions {
   const tandem_impact_options* impacts;
   const tandem_tolerance_options* verdicts;
   const tandem_bodies_at_options* bodies_at;
+  const tandem_configuration_options* configurations;
 } tandem_questions;
 
 /// Asks several questions, in the order of tandem_questions but bodies within others behind manifolds, until
@@ -812,6 +847,7 @@ typedef struct tandem_counters {
   tandem_impact_counters impacts;
   tandem_tolerance_counters verdicts;
   tandem_moved_counters moved;
+  tandem_configuration_counters configurations;
 } tandem_counters;
 
 TANDEM_API tandem_status tandem_scene_get_counters(const tandem_scene* scene, tandem_counters* counters);

@@ -61,6 +61,10 @@ class BroadPhase {
     return kept_of_ == 0 ? static_cast<std::uint32_t>(i) : free_[i];
   }
 
+  /// Calls visit(number) for each kept box that meets this one, whatever its world.
+  template <typename Visit>
+  void visit_kept(const WorldBox& box, const Visit& visit) const;
+
   /// The pairs of the last call that returned kOk; valid until the next call.
   std::span<const ObjectPair> pairs() const { return pairs_.view(); }
 
@@ -171,5 +175,28 @@ class BroadPhase {
   Buffer<ObjectPair> pairs_;
   Buffer<std::uint32_t> first_;  // where the pairs of each run of numbers begin
 };
+
+template <typename Visit>
+void BroadPhase::visit_kept(const WorldBox& box, const Visit& visit) const {
+  if (kept_of_ == 0) return;
+  // Each group taken off puts at most four of the level below on, of which three wait at most.
+  struct Waiting {
+    std::uint32_t group;
+    int level;
+  } stack[(kGroup - 1) * 17 + 1];
+  int height = 0;
+  stack[height++] = {0, kept_.top()};
+  while (height > 0) {
+    const Waiting at = stack[--height];
+    const Group& group = kept_.level(at.level)[at.group];
+    for (std::uint32_t i = 0; i < kGroup; ++i) {
+      bool meets = true;
+      for (int k = 0; k < 3; ++k) meets = meets && group.lo[k][i] <= box.hi[k] && box.lo[k] <= group.hi[k][i];
+      const std::uint32_t below = at.group * kGroup + i;
+      if (meets && at.level == 0) visit(kept_.items[below].box);
+      if (meets && at.level > 0) stack[height++] = {below, at.level - 1};
+    }
+  }
+}
 
 }  // namespace tandem

@@ -1,0 +1,158 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <map>
+#include <vector>
+
+#include "kernels/contact/contact_query_fixture.h"
+#include "kernels/scene/filter_oracle.h"
+#include "tandem/kernels/configuration_query.h"
+
+namespace tandem {
+namespace {
+
+using test::any_rotation;
+using test::centred_at;
+using test::FilterArrays;
+using test::random_filter;
+using Rows = std::vector<ConfigurationPair>;
+
+constexpr std::uint32_t kConfigurations = 60;
+
+// A crowd of bodies of which some move: the others stand, one of them removed.
+struct Question {
+  BodyScene scene = crowd(5, 60);
+  std::vector<std::uint32_t> bodies = {3, 41, 7, 8, 30, 59};
+  std::vector<Pose> poses;
+  FilterArrays filter;
+
+  explicit Question(unsigned parts) : filter(random_filter(60, parts, 9)) {
+    RandomPoses random(3);
+    for (std::uint32_t i = 0; i < kConfigurations; ++i) {
+      for (const std::uint32_t body : bodies) {
+        const double place[3] = {random.symmetric(5), random.symmetric(5), random.symmetric(5)};
+        const AssetView& asset = scene.assets.views()[scene.instances[body].asset];
+        poses.push_back(centred_at(asset, any_rotation(random), place));
+      }
+    }
+  }
+
+  ConfigurationOptions options() const { return {.bodies = bodies, .poses = poses}; }
+};
+
+// By moving the bodies and asking for contacts, one configuration after the other.
+Rows by_contacts(const Question& question, const PairFilter& filter, double within) {
+  Scene scene;
+  EXPECT_EQ(scene.set_assets(question.scene.assets.views()), Status::kOk);
+  EXPECT_EQ(scene.place(question.scene.instances, filter), Status::kOk);
+  EXPECT_EQ(scene.remove(17), Status::kOk);
+  ContactQuery query;
+  Rows rows;
+  const std::size_t moving = question.bodies.size();
+  for (std::uint32_t i = 0; i < kConfigurations; ++i) {
+    const std::span<const Pose> poses = std::span(question.poses).subspan(i * moving, moving);
+    EXPECT_EQ(scene.move(question.bodies, poses), Status::kOk);
+    EXPECT_EQ(query.find(scene, {.first_contact_only = true, .within = within}), Status::kOk);
+    for (const Contact& contact : query.rows()) {
+      const ObjectPair pair = query.pairs()[contact.pair];
+      const auto moves = [&](std::uint32_t body) { return std::ranges::count(question.bodies, body) != 0; };
+      if (moves(pair.a) || moves(pair.b)) rows.push_back({i, pair.a, pair.b});
+    }
+  }
+  std::ranges::sort(rows);
+  return rows;
+}
+
+TEST(Configurations, TouchWhereContactsOfTheMovedSceneDoWhateverTheFilterAndTheThreads) {
+  std::size_t touching = 0, free = 0;
+  for (const unsigned parts : {0u, 1u, 14u, 16u, 31u}) {
+    const Question question(parts);
+    ExcludedPairTable table;
+    const PairFilter filter = question.filter.view(table);
+    for (const double within : {0.0, 0.25}) {
+      const Rows expected = by_contacts(question, filter, within);
+      Scene scene;
+      ASSERT_EQ(scene.set_assets(question.scene.assets.views()), Status::kOk);
+      ASSERT_EQ(scene.place(question.scene.instances, filter), Status::kOk);
+      ASSERT_EQ(scene.remove(17), Status::kOk);
+      ConfigurationQuery query;
+      ConfigurationCounters counted;
+      for (const std::uint32_t threads : {1u, 2u, 5u}) {
+        SCOPED_TRACE(testing::Message() << "filter " << parts << ", within " << within << ", " << threads);
+        ASSERT_EQ(scene.set_threads(threads), Status::kOk);
+        ConfigurationOptions options = question.options();
+        options.within = within;
+        options.all_pairs = true;
+        ASSERT_EQ(query.find(scene, options), Status::kOk);
+        EXPECT_TRUE(std::ranges::equal(query.rows(), expected));
+        options.all_pairs = false;
+        ASSERT_EQ(query.find(scene, options), Status::kOk);
+        // One of each, and it is one of all.
+        std::map<std::uint32_t, int> of_each;
+        for (const ConfigurationPair& row : query.rows()) {
+          ++of_each[row.configuration];
+          EXPECT_TRUE(std::ranges::binary_search(expected, row));
+        }
+        for (const ConfigurationPair& row : expected) EXPECT_EQ(of_each[row.configuration], 1);
+        EXPECT_EQ(query.counters().touching, of_each.size());
+        EXPECT_EQ(query.counters().configurations, kConfigurations);
+        if (threads > 1) EXPECT_EQ(query.counters(), counted);
+        counted = query.counters();
+        touching += of_each.size();
+        free += kConfigurations - of_each.size();
+      }
+      EXPECT_TRUE(std::ranges::equal(std::span(scene.instances().data(), 17),
+                                     std::span(question.scene.instances.data(), 17),
+                                     [](const Instance& x, const Instance& y) { return x.asset == y.asset; }));
+    }
+  }
+  EXPECT_GT(touching, 400u);
+  EXPECT_GT(free, 400u);
+}
+
+TEST(Configurations, WhatCannotBeAskedIsNamed) {
+  Question question(0);
+  Scene scene;
+  ASSERT_EQ(scene.set_assets(question.scene.assets.views()), Status::kOk);
+  ASSERT_EQ(scene.place(question.scene.instances), Status::kOk);
+  ConfigurationQuery query;
+  ConfigurationOptions options = question.options();
+  const auto expect = [&](Status status, std::uint64_t where) {
+    EXPECT_EQ(query.find(scene, options), status);
+    EXPECT_EQ(scene.where(), where);
+    EXPECT_TRUE(query.rows().empty());
+    EXPECT_EQ(query.counters(), ConfigurationCounters());
+    options = question.options();
+  };
+  const std::uint32_t twice[] = {3, 4, 3}, unknown[] = {3, 60};
+  options.bodies = twice;
+  expect(Status::kUnknownInstance, 2);
+  options.bodies = unknown;
+  expect(Status::kUnknownInstance, 1);
+  options.poses = options.poses.first(7);
+  expect(Status::kMotionMismatch, 7);
+  options.within = -1;
+  expect(Status::kBadReach, 0);
+  for (const std::uint32_t threads : {1u, 3u}) {
+    ASSERT_EQ(scene.set_threads(threads), Status::kOk);
+    const Pose kept[] = {question.poses[100], question.poses[300]};
+    question.poses[300].translation[1] = 2e300;
+    question.poses[100].rotation[0][0] = 3;
+    expect(Status::kPoseNotRigid, 100);
+    question.poses[100] = kept[0];
+    expect(Status::kOutOfRange, 300);
+    question.poses[300] = kept[1];
+  }
+  // None that move, or no configurations.
+  options.bodies = {};
+  options.poses = {};
+  EXPECT_EQ(query.find(scene, options), Status::kOk);
+  EXPECT_EQ(query.counters(), ConfigurationCounters());
+  options = question.options();
+  options.poses = {};
+  EXPECT_EQ(query.find(scene, options), Status::kOk);
+  EXPECT_TRUE(query.rows().empty());
+}
+
+}  // namespace
+}  // namespace tandem

@@ -18,6 +18,13 @@ struct MovingPair {
   std::uint32_t a, b;
 };
 
+// Bodies and filter of a scene; another after each change. No scene has {}.
+struct SceneVersion {
+  std::uint64_t assets_id = 0, version = 0;
+
+  bool operator==(const SceneVersion&) const = default;
+};
+
 // A pair whose boxes meet, and how far these reach into each other in their shallowest direction.
 struct Meeting {
   const PosedTree *a, *b;
@@ -45,6 +52,7 @@ struct ConfigurationQuery::State : Allocated {
     bool enough_memory = true;
   };
 
+  bool stands_as_before(const SceneState& scene, std::span<const std::uint32_t> bodies) const;
   Status prepare(const SceneState& scene, const ConfigurationOptions& options);
   Status check_bodies(SceneState& scene, std::span<const std::uint32_t> bodies);
   void work(const SceneState& scene, const ConfigurationOptions& options, std::size_t configuration,
@@ -57,6 +65,8 @@ struct ConfigurationQuery::State : Allocated {
   Buffer<std::uint8_t> moves;  // of each body of the scene
   Buffer<MovingPair> moving_pairs;
   BroadPhase standing;  // keeps the boxes of those that stand
+  SceneVersion standing_of;
+  Buffer<std::uint32_t> moved_before;  // the bodies that did not stand then
   Buffer<Motion> motion;
   PerWorker<Worker> workers;
   std::atomic<std::size_t> first_refused;
@@ -73,7 +83,8 @@ Status ConfigurationQuery::State::check_bodies(SceneState& scene, std::span<cons
 }
 
 // What holds in all configurations: which of the bodies that move the filter looks at, and a tree of those
-// that stand. Removed bodies have a box that meets nothing.
+// that stand, which is kept while the scene stays as it is. Removed bodies have a box that meets nothing. The
+// caller may change the table of excluded pairs in its place, so that is asked in every call.
 Status ConfigurationQuery::State::prepare(const SceneState& scene, const ConfigurationOptions& options) {
   filter = scene.filter();
   moving_pairs.clear();
@@ -83,10 +94,22 @@ Status ConfigurationQuery::State::prepare(const SceneState& scene, const Configu
         return Status::kOutOfMemory;
     }
   }
-  if (!motion.resize(moves.size())) return Status::kOutOfMemory;
+  if (stands_as_before(scene, options.bodies)) return Status::kOk;
+  standing_of = {};
+  if (!motion.resize(moves.size()) || !moved_before.resize(options.bodies.size()))
+    return Status::kOutOfMemory;
+  std::copy(options.bodies.begin(), options.bodies.end(), moved_before.data());
   for (std::uint32_t i = 0; i < moves.size(); ++i)
     motion[i] = moves[i] != 0 || !scene.is_body(i) ? Motion::moving : Motion::fixed;
-  return standing.keep_fixed(scene.boxes.view(), motion.view(), filter.world);
+  const Status status = standing.keep_fixed(scene.boxes.view(), motion.view(), filter.world);
+  if (status == Status::kOk) standing_of = {scene.assets_id, scene.version};
+  return status;
+}
+
+bool ConfigurationQuery::State::stands_as_before(const SceneState& scene,
+                                                 std::span<const std::uint32_t> bodies) const {
+  return standing_of == SceneVersion{scene.assets_id, scene.version} &&
+         std::ranges::equal(moved_before.view(), bodies);
 }
 
 // False: a pose is refused.
@@ -116,10 +139,11 @@ bool ConfigurationQuery::State::meet(const SceneState& scene, const Configuratio
   bool enough_memory = true;
   const auto add = [&](const PosedTree& a, const PosedTree& b, const ObjectPair& pair, double depth) {
     const bool in_order = pair.a < pair.b;
-    enough_memory = enough_memory &&
-                    worker.meetings.push({in_order ? &a : &b, in_order ? &b : &a,
-                                          {std::min(pair.a, pair.b), std::max(pair.a, pair.b)},
-                                          depth});
+    enough_memory =
+        enough_memory && worker.meetings.push({in_order ? &a : &b,
+                                               in_order ? &b : &a,
+                                               {std::min(pair.a, pair.b), std::max(pair.a, pair.b)},
+                                               depth});
   };
   for (const MovingPair& pair : moving_pairs.view()) {
     const WorldBox &a = worker.boxes[pair.a], &b = worker.boxes[pair.b];
@@ -165,8 +189,7 @@ Status ConfigurationQuery::answer(SceneState& scene, const ConfigurationOptions&
   State* const state = state_.provide();
   if (state == nullptr) return scene.fail(Status::kOutOfMemory, 0);
   if (scene.device != nullptr) return scene.fail(Status::kBadOption, 0);
-  if (const Status status = check_within(options.within); status != Status::kOk)
-    return scene.fail(status, 0);
+  if (const Status status = check_within(options.within); status != Status::kOk) return scene.fail(status, 0);
   if (const Status status = state->check_bodies(scene, options.bodies); status != Status::kOk) return status;
   if (moving == 0 ? !options.poses.empty() : options.poses.size() % moving != 0)
     return scene.fail(Status::kMotionMismatch, options.poses.size());

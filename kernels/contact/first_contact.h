@@ -29,6 +29,7 @@ PairTask first_contact_task(const PosedTree& a, const PosedTree& b, double withi
 
 /// Does such a task, or any other of two posed trees, by the named way where it is in_frame. False: out of
 /// memory.
-bool run_contact_task(const PairTask& task, NarrowPhase way, ContactSink& sink, Buffer<NearBlockPair>& waiting);
+bool run_contact_task(const PairTask& task, NarrowPhase way, ContactSink& sink,
+                      Buffer<NearBlockPair>& waiting);
 
 }  // namespace tandem

@@ -101,13 +101,46 @@ TEST(Configurations, TouchWhereContactsOfTheMovedSceneDoWhateverTheFilterAndTheT
         touching += of_each.size();
         free += kConfigurations - of_each.size();
       }
-      EXPECT_TRUE(std::ranges::equal(std::span(scene.instances().data(), 17),
-                                     std::span(question.scene.instances.data(), 17),
-                                     [](const Instance& x, const Instance& y) { return x.asset == y.asset; }));
+      EXPECT_TRUE(std::ranges::equal(
+          std::span(scene.instances().data(), 17), std::span(question.scene.instances.data(), 17),
+          [](const Instance& x, const Instance& y) { return x.asset == y.asset; }));
     }
   }
   EXPECT_GT(touching, 400u);
   EXPECT_GT(free, 400u);
+}
+
+// What stands is prepared once, and again where anything of it changes.
+TEST(Configurations, SeeWhatChangedBetweenTwoCalls) {
+  const BodyScene cubes = row_of_cubes(3);  // each touches the next
+  Scene scene;
+  ASSERT_EQ(scene.set_assets(cubes.assets.views()), Status::kOk);
+  ASSERT_EQ(scene.place(cubes.instances), Status::kOk);
+  ConfigurationQuery query;
+  const std::uint32_t first[] = {0}, last[] = {2};
+  const Pose at_start[] = {cubes.instances[0].pose}, at_end[] = {cubes.instances[2].pose};
+  const auto touches = [&](std::span<const std::uint32_t> bodies, std::span<const Pose> poses) {
+    EXPECT_EQ(query.find(scene, {.bodies = bodies, .poses = poses}), Status::kOk);
+    return !query.rows().empty();
+  };
+  EXPECT_TRUE(touches(first, at_start));
+  EXPECT_TRUE(touches(first, at_start));
+  Pose away = cubes.instances[1].pose;
+  away.translation[1] += 5;
+  ASSERT_EQ(scene.move(1, away), Status::kOk);
+  EXPECT_FALSE(touches(first, at_start));
+  EXPECT_TRUE(touches(first, at_end));
+  EXPECT_FALSE(touches(last, at_end));
+  ASSERT_EQ(scene.remove(2), Status::kOk);
+  EXPECT_FALSE(touches(first, at_end));
+  std::uint32_t body = 0;
+  ASSERT_EQ(scene.add(cubes.instances[2], body), Status::kOk);
+  EXPECT_TRUE(touches(first, at_end));
+  PairFilter filter;
+  const std::uint32_t worlds[] = {1, 2, 2};
+  filter.world = worlds;
+  ASSERT_EQ(scene.place(cubes.instances, filter), Status::kOk);
+  EXPECT_FALSE(touches(first, at_start));
 }
 
 TEST(Configurations, WhatCannotBeAskedIsNamed) {

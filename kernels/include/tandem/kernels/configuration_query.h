@@ -46,9 +46,9 @@ class ConfigurationQuery : public Answer<ConfigurationPair, ConfigurationCounter
   /// all_pairs all. pairs() are none. find() takes about 100 KB of the stack of each thread. Result: kOk;
   /// kUnknownInstance, where where() of the scene is the place in `bodies` of one that does not exist or that
   /// stands there twice; kMotionMismatch where `poses` are not so many for each configuration; kBadReach (see
-  /// ContactOptions::within); kPoseNotRigid or kOutOfRange, where where() is the first such pose; kTooManyPairs
-  /// (2^32 - 1 configurations); kBadOption, where the scene is answered by a device; kCannotStartThread; or
-  /// kOutOfMemory.
+  /// ContactOptions::within); kPoseNotRigid or kOutOfRange, where where() is the first such pose;
+  /// kTooManyPairs (2^32 - 1 configurations); kBadOption, where the scene is answered by a device;
+  /// kCannotStartThread; or kOutOfMemory.
   Status find(Scene& scene, const ConfigurationOptions& options);
 
  private:

@@ -70,7 +70,7 @@ static void test_deforming(const char* folder) {
   const tandem_gpu_broad_phase_options sorted = sorted_pairs();
   const tandem_gpu_query_options grouped = grouped_contacts();
   const tandem_gpu_broad_phase_capacity near_room = {kBodies, kBodies * kBodies};
-  const tandem_gpu_query_capacity room = {kBodies * kBodies, 0, 200000, 20000};
+  const tandem_gpu_query_capacity room = {kBodies * kBodies, 0, 1000000, 200000};
   CHECK_STATUS(tandem_gpu_broad_phase_reserve(queries.near, &near_room, &sorted), TANDEM_OK);
   CHECK_STATUS(tandem_gpu_contact_query_reserve(queries.contacts, &room, &grouped), TANDEM_OK);
   const tandem_gpu_pairs pairs = tandem_gpu_broad_phase_pairs(queries.near);

@@ -77,7 +77,7 @@ TANDEM_API void tandem_gpu_assets_retain(tandem_gpu_assets* assets);
 /// The last reference frees the memory, which waits for the device. Null does nothing.
 TANDEM_API void tandem_gpu_assets_release(tandem_gpu_assets* assets);
 TANDEM_API size_t tandem_gpu_assets_count(const tandem_gpu_assets* assets);
-/// GPU memory that they hold.
+/// GPU memory that they hold; of assets of which some deform, without what they share with those at rest.
 TANDEM_API size_t tandem_gpu_assets_bytes(const tandem_gpu_assets* assets);
 
 /// ---- Assets that deform

@@ -1,7 +1,9 @@
 """tandem.dask: any number of workers gives the same bytes, and what is lost on the way costs time or is named."""
 import errno
 import os
+import importlib.util
 import pickle
+import re
 import resource
 import shutil
 import signal
@@ -24,6 +26,9 @@ from tandem import jobs  # noqa: E402
 
 ASSETS = Path(os.environ["TANDEM_SOURCE_DIR"]) / "assets"
 cloudpickle.register_pickle_by_value(sys.modules[__name__])  # workers cannot import the tests
+
+
+BLOCKS = re.findall(r"^```python\n(.*?)^```\n```\n(.*?)^```\n", (ASSETS.parent / "docs/clusters.md").read_text(), re.MULTILINE | re.DOTALL)
 
 
 def local_cluster(workers):
@@ -361,3 +366,13 @@ def test_filters_pickle():
     for kept in (filter, tandem.Filter(excluded=[[0, 1]]), tandem.Filter()):
         scenes = [tandem.Scene([triangle], translation=np.zeros((3, 3)), filter=one) for one in (kept, pickle.loads(pickle.dumps(kept)))]
         assert scenes[0].pairs().tolist() == scenes[1].pairs().tolist()
+
+
+@pytest.mark.parametrize("number", range(3))
+def test_programs_of_the_page_print_what_it_says(number, tmp_path):
+    code, shown = BLOCKS[number]
+    if "import ray" in code and not importlib.util.find_spec("ray"):
+        pytest.skip("ray is not installed")
+    (tmp_path / "program.py").write_text(code)
+    done = subprocess.run([sys.executable, tmp_path / "program.py"], capture_output=True, text=True, cwd=ASSETS.parent)
+    assert (done.returncode, done.stdout) == (0, shown), done.stderr

@@ -125,7 +125,7 @@ class Filter:
                 raise ValueError(f"{name} has shape {shape} where (n,) is wanted, the same as of the others")
         pairs = pairs_of(excluded, "excluded")
         self._core = _tandem.Filter(motions, groups, masks, pairs)
-        self._given = [None if array is None else array.copy() for array in (motions, groups, masks, pairs)]
+        self._given: list[npt.NDArray[Any] | None] = [None if array is None else array.copy() for array in (motions, groups, masks, pairs)]
 
     def __reduce__(self) -> tuple[type, tuple[npt.NDArray[Any] | None, ...]]:
         return Filter, tuple(self._given)

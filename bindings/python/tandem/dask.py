@@ -17,7 +17,7 @@ import os
 import queue
 import uuid
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple, overload
 
 import distributed
 import numpy as np
@@ -90,10 +90,10 @@ class _Unwritten(NamedTuple):
     reason: str
 
 
-def _outcomes(client: distributed.Client, name: str, function: Callable[..., Any], tasks: Sequence[tuple[Any, ...]]) -> Iterator[tuple[int, Any]]:
+def _outcomes(client: Any, name: str, function: Callable[..., Any], tasks: Sequence[tuple[Any, ...]]) -> Iterator[tuple[int, Any]]:
     """Runs function(*task) for all tasks. Yields the number of each, once, and its result or a _Lost, as they come."""
     run = f"tandem-{name}-{uuid.uuid4().hex}"
-    pending: dict[int, distributed.Future] = {}
+    pending: dict[int, Any] = {}
     done: queue.SimpleQueue[int] = queue.SimpleQueue()
     for number, task in enumerate(tasks):
         try:
@@ -114,18 +114,18 @@ def _outcomes(client: distributed.Client, name: str, function: Callable[..., Any
         yield number, _outcome(pending.pop(number))
 
 
-def _tell(done: queue.SimpleQueue[int], number: int, _: distributed.Future) -> None:
+def _tell(done: queue.SimpleQueue[int], number: int, _: Any) -> None:
     done.put(number)
 
 
-def _outcome(future: distributed.Future) -> Any:
+def _outcome(future: Any) -> Any:
     try:
         return future.result()
     except Exception as error:
         return _lost(error)
 
 
-def _answers(client: distributed.Client, name: str, function: Callable[..., Any], tasks: Sequence[tuple[Any, ...]]) -> Iterator[tuple[int, Any]]:
+def _answers(client: Any, name: str, function: Callable[..., Any], tasks: Sequence[tuple[Any, ...]]) -> Iterator[tuple[int, Any]]:
     """As _outcomes. Tasks that workers died of, or that were beside such a one, are tried once more, one at a time, so that a deadly one takes no other along."""
     again = []
     for number, outcome in _outcomes(client, name, function, tasks):
@@ -144,15 +144,18 @@ def _lost(error: Exception) -> _Lost:
 
 
 def _reason(error: BaseException) -> str:
-    first = next(iter(str(error).splitlines()), "")
-    return first if isinstance(error, (Error, OSError)) else f"{type(error).__name__}: {first}"
+    """One line."""
+    told = " ".join(str(error).split()) or type(error).__name__
+    if not isinstance(error, (Error, OSError)):
+        told = f"{type(error).__name__}: {told}"
+    return told if error.__cause__ is None else f"{told} ({_reason(error.__cause__)})"
 
 
-def _client(given: distributed.Client | None) -> distributed.Client:
-    return distributed.default_client() if given is None else given
+def _client(given: distributed.Client | None) -> Any:
+    return distributed.default_client() if given is None else given  # type: ignore[no-untyped-call,unused-ignore]
 
 
-def _task_count(client: distributed.Client) -> int:
+def _task_count(client: Any) -> int:
     """How many tasks the work is divided into. No answer depends on it."""
     if client.status != "running":  # every task will say so by itself
         return _TASKS_PER_THREAD
@@ -160,7 +163,7 @@ def _task_count(client: distributed.Client) -> int:
         threads = client.sync(client.scheduler.ncores, callback_timeout=_SCHEDULER_ANSWERS)
     except Exception:
         return _TASKS_PER_THREAD
-    return _TASKS_PER_THREAD * max(1, sum(threads.values()))
+    return _TASKS_PER_THREAD * max(1, int(sum(threads.values())))
 
 
 def build(paths: Iterable[str | os.PathLike[str]], folder: str | os.PathLike[str], *, effort: Effort = "default", levels: Levels | None = None, gpu_blocks: bool = True,
@@ -200,7 +203,7 @@ def build(paths: Iterable[str | os.PathLike[str]], folder: str | os.PathLike[str
                    {given: failures[path] for given, path in absolute.items() if path in failures}, sorted(built))
 
 
-def _planned(client: distributed.Client, paths: list[str], folder: str, options: jobs.BuildOptions) -> tuple[dict[str, str], dict[str, list[str]], dict[str, str]]:
+def _planned(client: Any, paths: list[str], folder: str, options: jobs.BuildOptions) -> tuple[dict[str, str], dict[str, list[str]], dict[str, str]]:
     """Reads all meshes: the .bvh files of those that have one, the .bvh files that are missing with all meshes of each, and why a mesh cannot be read."""
     files: dict[str, str] = {}
     wanted: dict[str, list[str]] = {}
@@ -217,7 +220,7 @@ def _planned(client: distributed.Client, paths: list[str], folder: str, options:
     return files, wanted, failures
 
 
-def _of_each_mesh(client: distributed.Client, name: str, function: Callable[..., Any], paths: list[str], *rest: Any) -> Iterator[tuple[str, Any]]:
+def _of_each_mesh(client: Any, name: str, function: Callable[..., Any], paths: list[str], *rest: Any) -> Iterator[tuple[str, Any]]:
     """Runs function(paths, *rest), which returns a list, on batches of paths. Yields each path once, with its entry or a _Lost."""
     batches = list(_batches(paths, -(-len(paths) // _task_count(client))))
     alone = []
@@ -307,6 +310,14 @@ def contacts(scene: jobs.FileScene, *, pairs: npt.ArrayLike | None = None, mode:
     return found
 
 
+@overload
+def check(scene: jobs.FileScene, configurations: npt.ArrayLike | Rows, *, pairs: Literal[False] = ..., client: distributed.Client | None = ...) -> npt.NDArray[np.bool_]: ...
+
+
+@overload
+def check(scene: jobs.FileScene, configurations: npt.ArrayLike | Rows, *, pairs: Literal[True], client: distributed.Client | None = ...) -> Rows: ...
+
+
 def check(scene: jobs.FileScene, configurations: npt.ArrayLike | Rows, *, pairs: bool = False, client: distributed.Client | None = None) -> Any:
     """Says of configurations of the moving bodies of a scene whether anything touches: exactly, by `tandem.Scene.contacts` of each.
 
@@ -329,12 +340,9 @@ def check(scene: jobs.FileScene, configurations: npt.ArrayLike | Rows, *, pairs:
     function = jobs.touching if flag(pairs, "pairs") else jobs.verdicts
     size = max(1, min(-(-len(rows) // _task_count(client)), _POSE_BYTES_PER_TASK // max(1, rows[:1].nbytes)))
     first = range(0, len(rows), size)
-    try:
-        if client.status != "running":
-            raise ConnectionError(_NO_SCHEDULER)
-        sent = client.submit(_same, scene, key=f"tandem-scene-{uuid.uuid4().hex}")  # once, and again where the worker that has it dies
-    except Exception:  # without a scheduler every task says so by itself
-        sent = scene
+    sent: Any = scene  # with every task; without a scheduler every task says so by itself
+    if client.status == "running":  # once, and again where the worker that has it dies
+        sent = client.submit(_same, scene, key=f"tandem-scene-{uuid.uuid4().hex}")
     answers = dict(_answers(client, "check", function, [(sent, rows[begin:begin + size]) for begin in first]))
     found, missing = [np.empty(0, jobs.TOUCHING if pairs else bool)], [np.empty(0, np.uint64)]
     for number, begin in enumerate(first):

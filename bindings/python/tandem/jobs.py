@@ -140,7 +140,7 @@ def build_file(path: str | os.PathLike[str], folder: str | os.PathLike[str], opt
     try:
         asset.save(file)
     except OSError as error:
-        raise NotWritten(error, file, asset) from error
+        raise NotWritten(error, file, asset) from None
     return Built(os.fspath(path), file, asset.file_bytes, True)
 
 
@@ -264,7 +264,8 @@ class Slice(NamedTuple):
     @property
     def scene_pairs(self) -> Rows:
         """The pairs by the scene's numbers of bodies, array of PAIR."""
-        return self.bodies[self.pairs.view("<u4")].view(PAIR)
+        pairs: Rows = self.bodies[self.pairs.view("<u4")].view(PAIR)
+        return pairs
 
 
 def divide(scene: FileScene, count: int, *, pairs: npt.ArrayLike | None = None, self_pairs: bool = False, within: float = 0.0, **options: Any) -> list[Slice]:

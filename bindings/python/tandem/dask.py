@@ -99,8 +99,10 @@ def _outcomes(client: Any, name: str, function: Callable[..., Any], tasks: Seque
         try:
             if client.status != "running":  # a task would wait for another scheduler
                 raise ConnectionError(_NO_SCHEDULER)
-            pending[number] = client.submit(function, *task, key=(run, number), pure=False)
-            pending[number].add_done_callback(functools.partial(_tell, done, number))
+            future = client.submit(function, *task, key=(run, number), pure=False)
+            future.add_done_callback(functools.partial(_tell, done, number))
+            pending[number] = future
+            del future  # so that a result is forgotten when it was handed on
         except Exception as error:
             yield number, _lost(error)
     while pending:

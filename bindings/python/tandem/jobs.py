@@ -145,7 +145,7 @@ def build_file(path: str | os.PathLike[str], folder: str | os.PathLike[str], opt
 
 
 class AssetFile(NamedTuple):
-    """A .bvh file, the hash of its content, and the level of detail that counts; None: its finest."""
+    """A .bvh file, the hash of its content, which FileScene fills in, and the level of detail that counts; None: its finest."""
 
     path: str
     hash: str

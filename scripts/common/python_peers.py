@@ -201,7 +201,7 @@ class Warp:
         while True:
             self.count = warp.zeros(1, dtype=int, device=self.device)
             self.found = warp.empty(self.room, dtype=warp.vec4i, device=self.device)
-            warp.launch(self.kernel, (len(posed[0]), self.faces), [self.mesh.id, self.corners, *posed, self.count, self.found], device=self.device)
+            warp.launch(self.kernel, (len(posed[0]), self.faces), [self.mesh.id, self.corners, self.corners, *posed, self.count, self.found], device=self.device)
             count = int(self.count.numpy()[0])
             if count <= self.room:
                 return

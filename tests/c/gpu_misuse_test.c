@@ -38,6 +38,24 @@ static void test_an_upload(tandem_asset* cube) {
   tandem_gpu_excluded_pairs_destroy(NULL);
 }
 
+// Functions of assets that deform refuse what is wrong before they look at a GPU.
+static void test_deforming(void) {
+  tandem_gpu_assets* made = (tandem_gpu_assets*)&made;
+  tandem_gpu_deform_report report = {TANDEM_INTERNAL_ERROR, 7, 7};
+  uint64_t where = 7;
+  const uint32_t first = 0;
+  CHECK_STATUS(tandem_gpu_assets_create_deforming(NULL, &first, 1, NULL, NULL, NULL, NULL),
+               TANDEM_NULL_ARGUMENT);
+  CHECK_STATUS(tandem_gpu_assets_create_deforming(NULL, &first, 1, NULL, NULL, &made, &where),
+               TANDEM_NULL_ARGUMENT);
+  CHECK(made == NULL && where == 0 && tandem_gpu_assets_deforming_count(NULL) == 0);
+  CHECK_STATUS(tandem_gpu_assets_enqueue_deform(NULL, NULL, NULL), TANDEM_NULL_ARGUMENT);
+  CHECK_STATUS(tandem_gpu_assets_deform(NULL, NULL, NULL), TANDEM_NULL_ARGUMENT);
+  CHECK_STATUS(tandem_gpu_assets_get_report(NULL, &report), TANDEM_NULL_ARGUMENT);
+  CHECK(report.status == TANDEM_OK && report.body == 0 && report.where == 0);
+  CHECK(tandem_gpu_assets_device_report(NULL) == NULL);
+}
+
 static const tandem_gpu_instances bodies = {NULL, NULL, 0, 0};
 static const tandem_gpu_pairs pairs = {NULL, NULL, 0, 0};
 
@@ -116,6 +134,7 @@ int main(int argc, char** argv) {
   if (argc != 2) return printf("usage: gpu_misuse_test ASSETS_FOLDER\n"), 1;
   tandem_asset* cube = build_obj(argv[1], "box_12.obj", NULL);
   test_an_upload(cube);
+  test_deforming();
   test_handles();
   tandem_asset_release(cube);
   return failures != 0;

@@ -1,12 +1,6 @@
 """Runs one file of tests; exit code 77, which ctest shows as skipped, where pytest is not there or all tests were skipped."""
 import sys
 
-try:
-    import pytest
-except ImportError:
-    print("pytest is not here: nothing is tested")
-    sys.exit(77)
-
 
 class Count:
     def __init__(self):
@@ -20,6 +14,16 @@ class Count:
         self.skipped += report.skipped
 
 
-count = Count()
-status = pytest.main(["-q", "-rs", "-p", "no:cacheprovider", *sys.argv[1:]], plugins=[count])
-sys.exit(77 if count.skipped and not count.others and status in (0, 5) else status)
+def main():
+    try:
+        import pytest
+    except ImportError:
+        print("pytest is not here: nothing is tested")
+        return 77
+    count = Count()
+    status = pytest.main(["-q", "-rs", "-p", "no:cacheprovider", *sys.argv[1:]], plugins=[count])
+    return 77 if count.skipped and not count.others and status in (0, 5) else status
+
+
+if __name__ == "__main__":  # processes that tests start by "spawn" import this file
+    sys.exit(main())

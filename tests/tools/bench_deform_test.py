@@ -5,6 +5,7 @@ Environment: that of bench_test.py.
 """
 import csv
 import json
+import os
 import unittest
 
 import h5py
@@ -217,6 +218,12 @@ class MadeDeformations(DeformBenchTest):
         result = self.run_tool("/usr/bin/python3", SOURCE_DIR / "scripts/make_deformations", "fold", plain, "-o", self.scene)
         self.assertEqual((result.returncode, self.scene.exists()), (2, False))
         self.assertIn(b"has no source vertices", result.stderr)
+
+    def test_the_peer_on_a_gpu_is_skipped_aloud_where_it_is_not_installed(self):
+        self.write_frames(CUBE)
+        self.write("warp.py", "raise ImportError('no warp here')")
+        result = self.run_tool("/usr/bin/python3", SOURCE_DIR / "scripts/deform_peers", self.scene, "--out", self.out, env={**os.environ, "PYTHONPATH": str(self.inputs)})
+        self.assertEqual((result.returncode, result.stderr, self.out.exists()), (77, b"deform_peers: skipped: no warp here\n", False))
 
 
 if __name__ == "__main__":

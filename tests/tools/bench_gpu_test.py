@@ -1,7 +1,9 @@
 #!/usr/bin/python3
-"""bvhbench query and impact --backend cuda from the outside. Environment: that of bench_test.py."""
+"""bvhbench query, impact and deform --backend cuda from the outside. Environment: that of bench_test.py."""
+import json
 import os
 import re
+import subprocess
 import unittest
 
 import h5py
@@ -44,6 +46,42 @@ class BenchGpu(BenchTest):
         result = self.bench("impact", self.scene, "--dt", "1", *self.ON_GPU, "--out", self.contacts, **options)
         self.assert_fails(result, UNUSABLE_GPU, "--backend cuda: ", *words)
         self.assertFalse(self.contacts.exists())
+
+    def bend(self, mesh, kind, frames=6, number=np.float32):
+        """A scene of a mesh that bends, and a rigid one in it."""
+        self.mesh_of(mesh, (SOURCE_DIR / f"assets/{mesh}.obj").read_text())
+        path = self.inputs / f"{kind}.h5"
+        done = subprocess.run([SOURCE_DIR / "scripts/make_deformations", kind, self.inputs / f"{mesh}.bvh", "-o", path, "--frames", str(frames)], capture_output=True, text=True)
+        self.assertEqual((done.returncode, done.stderr), (0, ""))
+        with h5py.File(path, "r+") as file:
+            positions = file["deformations/0"][:].astype(number)
+            del file["deformations/0"]
+            file["deformations/0"] = positions
+        return path
+
+    def test_deform_tells_why_there_is_no_gpu_and_which_options_are_for_the_cpu(self):
+        scene, csv = self.bend("box_192", "wave"), self.inputs / "frames.csv"
+        result = self.bench("deform", scene, *self.ON_GPU, "--rebuild", "--out", csv, env={**os.environ, "CUDA_VISIBLE_DEVICES": ""})
+        if not self.built:
+            return self.assert_fails(result, USAGE, "built without CUDA")
+        self.assert_fails(result, UNUSABLE_GPU, "--backend cuda: there is no GPU that can be used: ")
+        self.assertFalse(csv.exists())
+        for words in (["--self"], ["--threads", "2"]):
+            self.assert_fails(self.bench("deform", scene, *self.ON_GPU, *words), USAGE, words[0], "backend cpu")
+        self.assert_fails(self.bench("deform", scene, "--peers", "tandem-cuda"), USAGE, "tandem-cuda is none of")
+
+    def test_deformed_bodies_on_the_gpu_have_the_contacts_of_rebuilt_trees(self):
+        self.need_gpu()
+        for kind in ("twist", "collapse"):
+            scene = self.bend("cow_1500", kind)
+            expected, told = (json.loads(self.passes("deform", scene, "--rebuild", "--repeat", "2", "--json", *words)) for words in ([], self.ON_GPU))
+            self.assertEqual((told["backend"], told["threads"], told["worst_block_pairs"], told["peers"][0]["name"]), ("cuda", 0, None, "Tandem GPU"))
+            counts = [[frame["contacts"] for frame in report["peers"][0]["each_frame"]] for report in (expected, told)]
+            self.assertEqual(*counts)
+            self.assertTrue(all(frame["update_nanoseconds"] > 0 and frame["query_seconds"] > 0 for frame in told["peers"][0]["each_frame"]))
+            if kind == "twist":
+                self.assertGreater(len(set(counts[0])), 2)
+        self.assert_fails(self.bench("deform", self.bend("cow_1500", "wave", number=np.float64), *self.ON_GPU), UNREADABLE_INPUT, "float32")
 
     def test_options_of_another_backend_or_engine_are_refused(self):
         if not self.built:

@@ -41,7 +41,10 @@ FramePositions read_frame(const BendingScene& scene, std::uint32_t number) {
 class Follower {
  public:
   Follower(const BendingScene& scene, const DeformOptions& options, std::string_view engine)
-      : scene_(scene), options_(options), own_(engine == "tandem") {
+      : scene_(scene),
+        options_(options),
+        on_gpu_(engine == "tandem-cuda"),
+        own_(on_gpu_ || engine == "tandem") {
     engine_ = make_engine(
         engine, ContactOptions{.self_pairs = options.self_pairs, .leave_out_rings = options.leave_out_rings});
     engine_->set_threads(options.threads);
@@ -63,8 +66,11 @@ class Follower {
   // Result: the largest looseness of the shapes.
   std::optional<double> follow(const FramePositions& frame, std::uint32_t number) {
     std::optional<double> loosest;
-    for (std::size_t i = 0; i < frame.size(); ++i)
+    seconds_on_gpu_ = 0;
+    for (std::size_t i = 0; i < frame.size(); ++i) {
       loosest = std::max(loosest, deform(*engine_, scene_.bending[i], frame[i], scene_.path, number));
+      seconds_on_gpu_ += engine_->times().update;
+    }
     return loosest;
   }
 
@@ -93,18 +99,31 @@ class Follower {
   FrameWork work(const FramePositions& frame, std::uint32_t number, std::span<const ObjectPair> pairs) {
     FrameWork work;
     for (std::uint32_t i = 0; i < options_.repeats; ++i) {
-      note_least(work.update_seconds, i,
-                 seconds_by(options_.threads, [&] { work.looseness = follow(frame, number); }));
-      time_query(work, i, pairs);
+      const double seconds = seconds_by(options_.threads, [&] { work.looseness = follow(frame, number); });
+      note_least(work.update_seconds, i, on_gpu_ ? seconds_on_gpu_ : seconds);
+      if (!on_gpu_) time_query(work, i, pairs);
     }
-    take_answer(work);
+    if (on_gpu_)
+      ask_gpu(work);
+    else
+      take_answer(work);
     return work;
   }
 
  private:
+  void ask_gpu(FrameWork& work) {
+    TimedAnswer answer = engine_->time_query({scene_.given_pairs, options_.repeats});
+    work.query_seconds = *std::min_element(answer.whole.begin(), answer.whole.end());
+    work.contacts = answer.contacts.size();
+    work.block_pairs = engine_->counters().block_pairs;
+    contacts_ = std::move(answer.contacts);
+    pairs_ = std::move(answer.pairs);
+  }
+
   const BendingScene& scene_;
   const DeformOptions& options_;
-  const bool own_;
+  const bool on_gpu_, own_;
+  double seconds_on_gpu_ = 0;  // of the last follow()
   std::unique_ptr<Engine> engine_;
   std::vector<ObjectPair> pairs_;
   TriangleContacts contacts_;
@@ -218,7 +237,7 @@ std::optional<double> deform(Engine& engine, std::uint32_t shape, const Position
 }
 
 std::vector<PeerFrames> measure_frames(const BendingScene& scene, const DeformOptions& options) {
-  Follower tandem(scene, options, "tandem");
+  Follower tandem(scene, options, options.on_gpu ? "tandem-cuda" : "tandem");
   std::optional<Rebuilder> rebuilder;
   std::vector<std::unique_ptr<Follower>> others;
   std::vector<PeerFrames> results = {{tandem.engine().label(), tandem.engine().settings(), {}}};

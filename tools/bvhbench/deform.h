@@ -30,7 +30,7 @@ std::optional<double> deform(Engine& engine, std::uint32_t shape, const Position
                              const std::string& path, std::uint32_t frame);
 
 /// What a peer did of a frame. Seconds are the least of the repeats; a query is asked once before it is
-/// timed.
+/// timed. On a GPU its own clock tells them, and the query is a graph of the broad phase and the contacts.
 struct FrameWork {
   double update_seconds = 0;  ///< until its trees are those of the frame: refitted, or built anew
   double query_seconds = 0;
@@ -48,6 +48,7 @@ struct PeerFrames {
 struct DeformOptions {
   std::uint32_t frames = 0;  ///< how many of the scene's: the first ones
   std::uint32_t threads = 1, repeats = 1;
+  bool on_gpu = false;   ///< Tandem's shapes, the first result; else on the CPU
   bool rebuild = false;  ///< trees that are built anew for each frame are a peer too
   bool self_pairs = false;
   std::uint32_t leave_out_rings = 0;  ///< ContactOptions
@@ -55,9 +56,10 @@ struct DeformOptions {
 };
 
 /// Deforms the bodies frame by frame, and asks each peer for the contacts. The first result is Tandem's; with
-/// `rebuild`, that of the rebuilt trees follows. Times are those of this thread where there is one alone, and
-/// else of a clock. Throws FileError of the scene, std::runtime_error of a peer, and where a rebuilt tree has
-/// other contacts: different pairs of triangles, those aside that are degenerate and that it has not got.
+/// `rebuild`, that of trees that are rebuilt and asked on the CPU follows. Times are those of this thread
+/// where there is one alone, and else of a clock. Throws FileError of the scene, std::runtime_error of a
+/// peer, and where a rebuilt tree has other contacts: different pairs of triangles, those aside that are
+/// degenerate and that it has not got.
 std::vector<PeerFrames> measure_frames(const BendingScene& scene, const DeformOptions& options);
 
 }  // namespace tandem::bench

@@ -19,6 +19,9 @@ struct DeformArguments : CommonArguments {
   std::uint32_t leave_out_rings = 0;
   std::vector<std::string> peers;
   std::string asset;
+
+  /// One, unless told: of the CPU, where trees are rebuilt, too.
+  std::uint32_t threads() const { return told_threads.value_or(1); }
 };
 
 /// The peers' frames, and what they are about.
@@ -111,12 +114,14 @@ void add_peer(Report& report, Json& peers, const Measured& measured, const PeerF
 Report report_of(const DeformArguments& arguments, const Measured& measured) {
   Report report;
   report.line(arguments.scene + ": " + with_commas(measured.frames) + " frames, " +
-              with_commas(measured.triangles) + " triangles bend, " + threads_words(arguments.threads()));
+              with_commas(measured.triangles) + " triangles bend, " +
+              (arguments.on_gpu() ? "on a GPU" : threads_words(arguments.threads())));
   report.add({{"tool", "bvhbench deform"},
               {"version", TANDEM_VERSION},
               {"scene", arguments.scene},
               {"output", or_null(arguments.output)},
-              {"threads", arguments.threads()},
+              {"backend", arguments.backend},
+              {"threads", arguments.on_gpu() ? 0 : arguments.threads()},
               {"repeats", arguments.repeats},
               {"self_pairs", arguments.self_pairs},
               {"leave_out_rings", arguments.leave_out_rings},
@@ -129,10 +134,11 @@ Report report_of(const DeformArguments& arguments, const Measured& measured) {
   for (const PeerFrames& peer : measured.peers) add_peer(report, peers, measured, peer);
   report.add("peers", std::move(peers));
   if (!arguments.rebuild) return report;
-  const std::optional<double> worst = worst_ratio(measured.peers);
+  // A GPU walks other blocks.
+  const std::optional<double> worst = arguments.on_gpu() ? std::nullopt : worst_ratio(measured.peers);
   report.add("worst_block_pairs", or_null(worst));
-  report.line("refitted and rebuilt trees: the same contacts in every frame, up to " +
-              or_dash(worst, "%.3f") + " times the block pairs");
+  report.line("refitted and rebuilt trees: the same contacts in every frame" +
+              (arguments.on_gpu() ? "" : ", up to " + or_dash(worst, "%.3f") + " times the block pairs"));
   return report;
 }
 
@@ -161,6 +167,7 @@ Measured measure(const DeformArguments& arguments, const BendingScene& scene, co
   const DeformOptions options = {arguments.frames.value_or(scene.frames),
                                  arguments.threads(),
                                  arguments.repeats,
+                                 arguments.on_gpu(),
                                  arguments.rebuild,
                                  arguments.self_pairs,
                                  arguments.leave_out_rings,
@@ -208,6 +215,9 @@ Measured measure_animation(const DeformArguments& arguments) {
 ExitCode run_deform(const DeformArguments& arguments) {
   if (arguments.self_pairs && !arguments.peers.empty())
     throw UsageError("--self is for Tandem alone, so --peers does not go with it");
+  if (arguments.self_pairs && arguments.on_gpu())
+    throw UsageError("--self is for the backend cpu; /pairs of a scene may name an instance twice");
+  if (arguments.told_threads && arguments.on_gpu()) throw UsageError("--threads is for the backend cpu");
   const std::string ending = std::filesystem::path(arguments.scene).extension().string();
   const bool is_gltf = ending == ".glb" || ending == ".gltf";
   const Measured measured = is_gltf ? measure_animation(arguments) : measure_scene(arguments);
@@ -217,8 +227,11 @@ ExitCode run_deform(const DeformArguments& arguments) {
 }
 
 std::vector<std::string> peers_of_tandem() {
-  const auto names = deforming_engine_names();
-  return {names.begin() + 1, names.end()};
+  std::vector<std::string> names;
+  for (const std::string_view name : deforming_engine_names()) {
+    if (!name.starts_with("tandem")) names.emplace_back(name);
+  }
+  return names;
 }
 
 std::string joined(const std::vector<std::string>& words) {
@@ -232,11 +245,11 @@ void add_deform(Command tool, Run& run_later) {
   const auto [command, arguments] = add_command<DeformArguments>(
       tool, run_later, "deform",
       "refit the trees of bodies that bend, frame by frame, and find their contacts", run_deform);
-  arguments.told_threads = 1;
   command.add(
       {scene_argument(arguments, "scene file (HDF5) with deformations, or animation (.glb, .gltf)"),
        {"--asset", arguments.asset, "",
         "for an animation: the .bvh file of its mesh; else one is built for it", file_name()},
+       backend_option(arguments),
        {"--frames", arguments.frames, "N",
         "the first N frames of a scene, else all; or so many of an animation, else 100", between(1, 4e9)},
        {"--rebuild", arguments.rebuild,

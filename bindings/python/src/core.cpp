@@ -6,10 +6,14 @@ namespace tandem::python {
 
 void check(tandem_status status, std::uint64_t where) {
   if (status == TANDEM_OK) return;
+  throw_status(status, tandem_status_explain(status), tandem_status_subject(status), where);
+}
+
+void throw_status(tandem_status status, const char* sentence, const char* subject, std::uint64_t where) {
+  const nb::object counted = subject != nullptr ? nb::object(nb::str(subject)) : nb::none();
   const nb::object error =
       nb::module_::import_("tandem._errors")
-          .attr("from_status")(status, tandem_status_name(status), tandem_status_explain(status),
-                               tandem_status_subject(status), where);
+          .attr("from_status")(status, tandem_status_name(status), sentence, counted, where);
   PyErr_SetObject(error.type().ptr(), error.ptr());
   throw nb::python_error();
 }

@@ -19,6 +19,11 @@ namespace nb = nanobind;
 /// Throws the Python exception of a status that is not TANDEM_OK (tandem._errors.from_status).
 void check(tandem_status status, std::uint64_t where = 0);
 
+/// Throws the exception of a status, with what is wrong in a sentence, and what `where` counts; null: nothing
+/// is to blame.
+[[noreturn]] void throw_status(tandem_status status, const char* sentence, const char* subject,
+                               std::uint64_t where);
+
 /// An options struct of the C interface with its size, and zeros.
 template <typename Options>
 Options sized() {

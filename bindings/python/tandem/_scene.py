@@ -2,7 +2,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -109,7 +109,7 @@ class Verdicts(NamedTuple):
 
 
 class Filter:
-    """Which pairs of bodies a scene looks at, of all whose world boxes meet. Keeps copies of what it is made of.
+    """Which pairs of bodies a scene looks at, of all whose world boxes meet. Keeps copies of what it is made of, and pickles.
 
     Args:
         motion: (n,), of each body MOVING, FIXED, KINEMATIC or SLEEPING; pairs without anything that moves are not looked at.
@@ -123,7 +123,7 @@ class Filter:
     [(0, 2), (1, 2)]
     """
 
-    __slots__ = ("_core", "_motion")
+    __slots__ = ("_core", "_given")
 
     def __init__(self, motion: npt.ArrayLike | None = None, group: npt.ArrayLike | None = None, mask: npt.ArrayLike | None = None,
                  world: npt.ArrayLike | None = None, excluded: npt.ArrayLike | None = None):
@@ -135,8 +135,16 @@ class Filter:
         for name, shape in shapes.items():
             if len(shape) != 1 or shape != next(iter(shapes.values())):
                 raise ValueError(f"{name} has shape {shape} where (n,) is wanted, the same as of the others")
-        self._core = _tandem.Filter(motions, groups, masks, worlds, pairs_of(excluded, "excluded"))
-        self._motion = None if motions is None else motions.copy()
+        pairs = pairs_of(excluded, "excluded")
+        self._core = _tandem.Filter(motions, groups, masks, worlds, pairs)
+        self._given: list[npt.NDArray[Any] | None] = [None if array is None else array.copy() for array in (motions, groups, masks, worlds, pairs)]
+
+    def __reduce__(self) -> tuple[type, tuple[npt.NDArray[Any] | None, ...]]:
+        return Filter, tuple(self._given)
+
+    @property
+    def _motion(self) -> npt.NDArray[np.uint8] | None:
+        return self._given[0]
 
 
 def _core_of(filter: Filter | None) -> _tandem.Filter | None:

@@ -9,7 +9,7 @@ for the default stream. The results keep such an object; where a number was give
 """
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -26,7 +26,7 @@ try:
 except ImportError as missing:
     raise ImportError(f"tandem.cuda is not there: the package was built without CUDA, or CUDA's runtime is not found ({missing})") from missing
 
-__all__ = ["Array", "Contacts", "Contained", "Distances", "Filter", "Impacts", "Instances", "Manifolds", "Query", "Queued", "Rows", "TooLittleRoom", "Verdicts"]
+__all__ = ["Array", "Contacts", "Contained", "Distances", "Filter", "Impacts", "Instances", "Manifolds", "Positions", "Query", "Queued", "Rows", "TooLittleRoom", "Verdicts"]
 
 #: An array in GPU memory, with DLPack and `__cuda_array_interface__`, `shape`, `dtype` and `pointer`. It keeps the memory that it lies in.
 Array = _cuda.Array
@@ -160,6 +160,18 @@ class Instances:
         return len(self._core)
 
 
+class Positions:
+    """Positions of assets that deform: arrays on a GPU, which every call reads where they are. Made once by `Query.positions`, it spares calls the look at the
+    arrays; what writes there goes on the stream of the calls, or is waited for."""
+
+    __slots__ = ("_core", "given")
+
+    def __init__(self, core: _cuda.Positions, given: Mapping[int, Any]):
+        self._core: _cuda.Positions = core
+        #: By asset, as they were given.
+        self.given = given
+
+
 class Filter:
     """Says which pairs a query looks at, of all whose world boxes meet, as the CPU's Filter does; but its arrays lie in GPU memory and are read there in every
     call.
@@ -226,7 +238,7 @@ class Queued:
             stream: that on which a graph was replayed. None: that of `enqueue`; where one was captured, all streams of the device.
 
         Raises:
-            Error: what the GPU found wrong, with the instance or pair to blame.
+            Error: what the GPU found wrong, with the instance or pair to blame, or with the vertex where positions of `Query.enqueue_deform` were bad.
             TooLittleRoom: contacts are missing.
         """
         complete, pairs, contacts, needed_pairs, needed_contacts, needed_undecided = self._core.wait(self._given, None if stream is None else _stream(stream))
@@ -242,6 +254,8 @@ class Query:
         assets: that instances refer to by their place in this list; copied to the GPU.
         device: the GPU's number.
         contents: "all"; "exact": what `contacts` in mode "exact" and `verdicts` take, a third less; "manifolds": these and what manifolds and contained bodies take.
+        deforming: the assets, by their places in the list, that `deform` gives other shapes; list an asset twice where one of its bodies bends alone. Their files
+            need source vertices, and `contents` is not "exact". Each takes 48 bytes a triangle and 240 a block more, and `verdicts` is not offered.
 
     Calls take the instances as `Query.instances` made them, or as two arrays:
 
@@ -256,10 +270,14 @@ class Query:
     A query takes one call at a time: a second thread gets RuntimeError.
     """
 
-    __slots__ = ("_assets", "_core", "_given", "_step", "__weakref__")
+    __slots__ = ("_assets", "_core", "_deforming", "_given", "_positions", "_step", "__weakref__")
 
-    def __init__(self, assets: Iterable[Asset], *, device: int = 0, contents: Literal["all", "exact", "manifolds"] = "all", stream: Any = None):
-        self._assets = _cuda.Assets(cores_of(assets), device, _choice("contents", contents, _CONTENTS), _stream(stream))
+    def __init__(self, assets: Iterable[Asset], *, device: int = 0, contents: Literal["all", "exact", "manifolds"] = "all", deforming: Iterable[int] = (),
+                 stream: Any = None):
+        cores = cores_of(assets)
+        self._deforming = sorted({whole_number(asset, "deforming", 0, len(cores) - 1) for asset in deforming})
+        self._assets = _cuda.Assets(cores, device, _choice("contents", contents, _CONTENTS), self._deforming, _stream(stream))
+        self._positions: _cuda.Positions | None = None  # those that were queued last
         self._core = _cuda.Query(self._assets)
         self._given: Any = None  # the pairs of the last contacts()
         self._step: _cuda.Step | None = None
@@ -273,6 +291,41 @@ class Query:
         if pose is None:
             raise TypeError("pose is missing")
         return Instances(_cuda.Instances(self._assets, asset, pose, _stream(stream)), asset, pose)
+
+    def positions(self, positions: Mapping[int, Any], *, stream: Any = None) -> Positions:
+        """Looks at arrays of positions once for many calls, which read them anew.
+
+        Args:
+            positions: by asset, of some of those that deform: (n, 3) float32, a row for each vertex of the mesh that the asset was built from
+                (`Asset.source_vertices`), in its coordinates.
+        """
+        if not isinstance(positions, Mapping):
+            raise TypeError(f"positions is {type(positions).__name__} where a dict of arrays by asset is wanted")
+        for asset in positions:
+            if asset not in self._deforming:
+                raise ValueError(f"positions names asset {asset!r} where {self._deforming or 'no asset'} may deform: Query(..., deforming=[...])")
+        return Positions(_cuda.Positions(self._assets, [positions.get(asset) for asset in self._deforming], _stream(stream)), positions)
+
+    def deform(self, positions: Positions | Mapping[int, Any], *, stream: Any = None) -> None:
+        """Gives assets other positions, as often as you like, and waits: all their bodies take the shape of the triangles between these, where they stand. What
+        the query finds from then on is about these shapes, `verdicts` aside. Assets that are not named stay as they are.
+
+        Args:
+            positions: what `positions` made, or takes.
+
+        Raises:
+            Error: a position is NaN or too large: `where` is the first such vertex. Its asset stays as it is then.
+        """
+        made = positions if isinstance(positions, Positions) else self.positions(positions, stream=stream)
+        self._assets.deform(made._core, _stream(stream))
+
+    def enqueue_deform(self, positions: Positions, *, stream: Any = None) -> None:
+        """Queues the same, for what is queued behind it, and neither waits nor allocates: it may be captured into a CUDA graph together with `enqueue`. Keep the
+        positions until the stream has passed the call, and as long as such a graph. `Queued.wait` tells what was wrong with the positions."""
+        if not isinstance(positions, Positions):
+            raise TypeError(f"positions is {type(positions).__name__} where what Query.positions() made is wanted")
+        self._assets.enqueue_deform(positions._core, _stream(stream))
+        self._positions = positions._core
 
     def _about(self, instances: Instances | None, asset: Any, pose: Any, pairs: Any, filter: Filter | None, stream: Any
                ) -> tuple[_cuda.Instances, _cuda.Pairs | None, _cuda.Filter | None, _cuda.Stream]:

@@ -191,8 +191,9 @@ class Engine {
 
   /// Gives the source vertices of a shape other positions, in the file's coordinates. Its bodies take the
   /// shape of the triangles between these, where they stand. Result: how loose the tree has become, as
-  /// Scene::looseness() says; nothing where the library does not tell. Condition: update(). Throws
-  /// EngineError as Scene::deform() fails.
+  /// Scene::looseness() says; nothing where the library does not tell. An engine on a GPU takes float32
+  /// numbers alone, and puts the seconds of the refit, by the GPU's clock and without the copy of the
+  /// positions, into times().update. Condition: update(). Throws EngineError as Scene::deform() fails.
   virtual std::optional<double> deform(std::uint32_t /*shape*/, const VertexPositions& /*positions*/) {
     cannot("deform shapes");
   }
@@ -263,7 +264,7 @@ class Engine {
   virtual TimedImpacts time_impacts(const TimedQuery& /*asked*/) { cannot("time impacts"); }
   virtual TimedVerdicts time_verdicts(const TimedQuery& /*asked*/) { cannot("time verdicts"); }
 
-  /// Returns the times that the phases of the last find() took.
+  /// Returns the times that the phases of the last find() took, and on a GPU the last deform().
   const EngineTimes& times() const { return times_; }
 
   /// Returns what the last query for contacts counted. Counts that an engine does not keep as Tandem does are

@@ -66,6 +66,7 @@ void GpuEngine::stage(const Elements& elements, StagedArray<Element>& array, con
 void GpuEngine::set_shapes(std::span<const AssetView> shapes) {
   Stopwatch watch;
   shapes_.clear();
+  deforming_.clear();
   check(uploaded_.upload(shapes, needs_.contents, stream()), uploaded_.cuda_error(), "assets");
   for (std::size_t i = 0; i < shapes.size(); ++i) {
     const std::size_t levels = needs_.all_levels ? shapes[i].levels.size() : 1;
@@ -98,6 +99,37 @@ void GpuEngine::update(std::span<const BodyPose> bodies) {
   upload_of_bodies_ = watch.lap();
 }
 
+// Returns the shape as one that deforms, with these positions on the GPU. The first such shape gives all
+// shapes records, which the query follows from then on.
+DeformingShape& GpuEngine::deforming(std::uint32_t shape, std::span<const float> positions) {
+  const auto [found, is_new] = deforming_.try_emplace(shape);
+  DeformingShape& of = found->second;
+  stage(positions, of.positions, "positions", std::identity());
+  if (!is_new) return of;
+  const float* const place[] = {of.positions.on_gpu.data()};
+  stage(std::span(place), of.place, "positions", std::identity());
+  if (deforming_.size() == 1) check(list_.set(shapes_, stream()), cudaSuccess, "deformed shapes");
+  const Status status = of.deformer.begin(shapes_, std::span(&shape, 1), list_.records(), stream());
+  check(status, of.deformer.cuda_error(), "deformed shapes");
+  of.refit = captured([this, &of] {
+    check(of.deformer.enqueue(of.place.on_gpu.data(), stream()), of.deformer.cuda_error(), "refit");
+  });
+  name_shapes();
+  return of;
+}
+
+std::optional<double> GpuEngine::deform(std::uint32_t shape, const VertexPositions& positions) {
+  if (needs_.all_levels || needs_.finds_pairs) cannot("deform shapes");
+  if (!std::holds_alternative<std::span<const float>>(positions)) require(Status::kNotFloat32, shape);
+  const auto given = std::get<std::span<const float>>(positions);
+  if (shapes_[shape].tree.source_vertices == nullptr) require(Status::kNoSourceVertices, shape);
+  if (given.size() != 3 * shapes_[shape].source_vertices) require(Status::kVertexCountMismatch, shape);
+  DeformingShape& of = deforming(shape, given);
+  times_.update = time_repeats(1, of.refit).front();
+  require(of.deformer.report().status, of.deformer.report().where);
+  return {};
+}
+
 void GpuEngine::keep_fixed() {
   if (filter_.motion == nullptr) return;
   const std::span<const Motion> motion(filter_.motion, instances_.count);
@@ -123,6 +155,7 @@ const PairFilter& GpuEngine::upload_filter() {
 }
 
 GpuAssetBounds GpuEngine::bounds() const {
+  if (!deforming_.empty()) return list_.records().bounds_of_all();
   return {bounds_.on_gpu.data(), bounds_count_};
 }
 
@@ -206,15 +239,19 @@ std::size_t GpuEngine::scene_bytes(const TimedQuery& asked) const {
          (asked.given != nullptr ? asked.given->size() * sizeof(ObjectPair) : 0);
 }
 
-GpuUse GpuEngine::use(const TimedQuery& asked, std::size_t bytes, std::size_t bound) const {
-  GpuUse use;
+std::string GpuEngine::gpu_name() const {
   int device = 0;
   cudaDeviceProp properties;
-  std::size_t free = 0, total = 0;
-  check(cudaMemGetInfo(&free, &total), "memory");
   check(cudaGetDevice(&device), "start");
   check(cudaGetDeviceProperties(&properties, device), "start");
-  use.name = properties.name;
+  return properties.name;
+}
+
+GpuUse GpuEngine::use(const TimedQuery& asked, std::size_t bytes, std::size_t bound) const {
+  GpuUse use;
+  std::size_t free = 0, total = 0;
+  check(cudaMemGetInfo(&free, &total), "memory");
+  use.name = gpu_name();
   use.upload = upload_of_shapes_ + upload_of_bodies_;
   use.bytes = scene_bytes(asked) + broad_phase_.bytes() + bytes;
   use.bytes_bound = bound == 0 ? 0 : scene_bytes(asked) + bound;

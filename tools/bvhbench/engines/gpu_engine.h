@@ -1,5 +1,6 @@
 #pragma once
 #include <functional>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -8,6 +9,7 @@
 #include "tandem/formats/gpu_stream.h"
 #include "tandem/kernels/gpu_arrays.h"
 #include "tandem/kernels/gpu_broad_phase.h"
+#include "tandem/kernels/gpu_deformer.h"
 #include "tandem/kernels/gpu_excluded_pairs.h"
 #include "tandem/runtime/upload.h"
 
@@ -31,6 +33,14 @@ struct StagedArray {
   }
 };
 
+/// A shape that deforms, and where its positions lie.
+struct DeformingShape {
+  GpuDeformer deformer;
+  StagedArray<float> positions;
+  StagedArray<const float*> place;
+  std::function<void()> refit;  ///< queues the call
+};
+
 /// Says what a question on a GPU takes of a scene.
 struct GpuNeeds {
   Contents contents = Contents::all;  ///< of the shapes
@@ -44,6 +54,7 @@ class GpuEngine : public Engine {
  public:
   void set_shapes(std::span<const AssetView> shapes) final;
   void update(std::span<const BodyPose> bodies) final;
+  std::optional<double> deform(std::uint32_t shape, const VertexPositions& positions) final;
   void keep_fixed() final;
   std::span<const ObjectPair> find_pairs() final;
 
@@ -54,6 +65,8 @@ class GpuEngine : public Engine {
   cudaStream_t stream() const { return stream_.get(); }
   std::span<const GpuAsset> shapes() const { return shapes_; }
   const GpuInstances& instances() const { return instances_; }
+  /// The records of shapes() that a query follows; null where none ever deformed.
+  const GpuAsset* records() const { return deforming_.empty() ? nullptr : list_.records().assets; }
   const RigidMotion* motion_on_gpu() const { return motions_.on_gpu.data(); }
 
   /// Throw what a call that failed calls for. `step`: what was done.
@@ -66,11 +79,14 @@ class GpuEngine : public Engine {
     check(status, query.cuda_error(), step);
   }
 
-  /// Tells the query of shapes().
+  /// Tells the query of shapes(), and of records().
   virtual void name_shapes() = 0;
 
   /// Uploads the filter, which is in GPU memory until the next call.
   const PairFilter& upload_filter();
+
+  /// The name of the GPU, as its driver tells it.
+  std::string gpu_name() const;
 
   /// Finds the pairs that the filter looks at, until there is room for all.
   void find_pairs_on_gpu(bool sorted);
@@ -107,6 +123,7 @@ class GpuEngine : public Engine {
 
  private:
   GpuAssetBounds bounds() const;
+  DeformingShape& deforming(std::uint32_t shape, std::span<const float> positions);
   GpuBroadPhaseOptions broad_phase_options(bool sorted) const;
   template <typename Elements, typename Element, typename Get>
   void stage(const Elements& elements, StagedArray<Element>& array, const char* step, const Get& get);
@@ -122,6 +139,8 @@ class GpuEngine : public Engine {
   std::vector<GpuAsset> shapes_;
   std::uint32_t bounds_count_ = 0;
   StagedArray<AssetBounds> bounds_;
+  GpuAssetList list_;                                  // once a shape deforms
+  std::map<std::uint32_t, DeformingShape> deforming_;  // by shape
   StagedArray<std::uint32_t> shape_of_, pair_count_;
   StagedArray<Pose> poses_;
   StagedArray<RigidMotion> motions_;

@@ -44,7 +44,7 @@ constexpr Maker *kTandemCuda = where(TANDEM_HAVE_CUDA, make_tandem_cuda),
 
 constexpr Entry kEntries[] = {
     {"tandem", "tandem", kAll, kSimulates, "", make_tandem, true, true},
-    {"tandem-cuda", "", kAll, kSimulates, "CUDA", kTandemCuda, true},
+    {"tandem-cuda", "", kAll, kSimulates, "CUDA", kTandemCuda, true, true},
     {"paper", "", kContacts, kSimulates, "CUDA", kPaper, true},
     {"paper-bits", "", kContacts, kSimulates, "CUDA", kPaper, true},
     {"fcl", "fcl", kContacts, kSimulates, "FCL", kFcl, false, true},

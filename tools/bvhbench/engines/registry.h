@@ -12,7 +12,8 @@ namespace tandem {
 /// embree, embree-refit.
 std::vector<std::string_view> engine_names();
 
-/// The engines whose shapes can be deformed, of those built in; "tandem" is the first.
+/// The engines whose shapes can be deformed, of those built in; "tandem" is the first, and then
+/// "tandem-cuda".
 std::vector<std::string_view> deforming_engine_names();
 
 /// Returns whether this program has the engine.

@@ -28,6 +28,11 @@ class CudaContacts final : public GpuContactEngine {
                           .within = options.within}),
         options_(options) {}
 
+  std::string label() const override { return "Tandem GPU"; }
+  std::string settings() const override {
+    return "on " + gpu_name() + ", timed there: positions, poses and contacts lie in its memory";
+  }
+
  private:
   GpuContactOptions options(OrderOnGpu order) const {
     return {.mode = options_.mode,
@@ -123,7 +128,8 @@ class CudaContacts final : public GpuContactEngine {
   }
 
   void name_shapes_to(GpuContactQuery& query) const {
-    const Status status = query.set_assets(shapes(), stream());
+    Status status = query.set_assets(shapes(), stream());
+    if (status == Status::kOk) status = query.follow(records());
     check(status, query.cuda_error(), "assets");
   }
 
@@ -152,7 +158,11 @@ class CudaRows : public GpuEngine {
  protected:
   using GpuEngine::GpuEngine;
 
-  void name_shapes() override { check(set_assets(), query_.cuda_error(), "assets"); }
+  void name_shapes() override {
+    Status status = set_assets();
+    if (status == Status::kOk) status = query_.follow(records());
+    check(status, query_.cuda_error(), "assets");
+  }
 
   /// Tell the query of shapes(); find the rows of these pairs, until everything has room; queue that once
   /// more. Without pairs, the query finds them itself.

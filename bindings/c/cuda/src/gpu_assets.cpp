@@ -1,3 +1,6 @@
+#include <algorithm>
+#include <span>
+
 #include "gpu_handles.h"
 
 using namespace tandem;
@@ -17,16 +20,17 @@ AssetView view_of(const tandem_asset* asset) {
   return view_of_checked(tandem_asset_data(asset, nullptr)).levels_from(info.first_level, info.level_count);
 }
 
+// Copies the records of the assets, and their bounds.
+tandem_status list_assets(tandem_gpu_assets& made, cudaStream_t stream) {
+  const Status status = made.list.set(made.assets.view(), stream);
+  return told(status, status == Status::kOk ? cudaSuccess : cudaGetLastError());
+}
+
 tandem_status upload(tandem_gpu_assets& made, tandem_asset* const* assets, size_t count, Contents contents,
                      cudaStream_t stream) {
   Buffer<AssetView> views;
-  Buffer<AssetBounds> bounds;
-  if (!views.resize(count) || !bounds.resize(count) || !made.assets.resize(count))
-    return TANDEM_OUT_OF_MEMORY;
-  for (size_t i = 0; i < count; ++i) {
-    views[i] = view_of(assets[i]);
-    bounds[i] = asset_bounds(*views[i].header);
-  }
+  if (!views.resize(count) || !made.assets.resize(count)) return TANDEM_OUT_OF_MEMORY;
+  for (size_t i = 0; i < count; ++i) views[i] = view_of(assets[i]);
   const Status status = made.files.upload(views.view(), contents, stream);
   if (status != Status::kOk) return told(status, made.files);
   for (size_t i = 0; i < count; ++i) {
@@ -35,9 +39,53 @@ tandem_status upload(tandem_gpu_assets& made, tandem_asset* const* assets, size_
       if (l == 0) made.assets[i] = made.levels[made.levels.size() - 1];
     }
   }
-  cudaError_t error = made.bounds.upload(bounds.view(), stream);
-  if (error == cudaSuccess) error = cudaStreamSynchronize(stream);
-  return told(status_of(error), error);
+  return list_assets(made, stream);
+}
+
+// Returns how many of the numbers name an asset that can deform and ascend; `status`: what is wrong with the
+// next.
+size_t count_of_sound(const tandem_gpu_assets& assets, std::span<const uint32_t> deforming,
+                      tandem_status& status) {
+  for (size_t i = 0; i < deforming.size() && status == TANDEM_OK; ++i) {
+    if (deforming[i] >= assets.assets.size())
+      status = TANDEM_UNKNOWN_ASSET;
+    else if (assets.assets[deforming[i]].tree.source_vertices == nullptr)
+      status = TANDEM_NO_SOURCE_VERTICES;
+    else if (i > 0 && deforming[i] <= deforming[i - 1])
+      status = TANDEM_BAD_OPTION;
+    if (status != TANDEM_OK) return i;
+  }
+  return deforming.size();
+}
+
+tandem_status make_deforming(tandem_gpu_assets& made, tandem_gpu_assets& at_rest,
+                             std::span<const uint32_t> deforming, cudaStream_t stream) {
+  tandem_gpu_assets_retain(&at_rest);
+  made.at_rest = &at_rest;
+  const std::span<const GpuAsset> assets = at_rest.assets.view();
+  if (!made.assets.resize(assets.size())) return TANDEM_OUT_OF_MEMORY;
+  std::copy(assets.begin(), assets.end(), made.assets.data());
+  if (const tandem_status status = list_assets(made, stream); status != TANDEM_OK) return status;
+  GpuDeformer& deformer = made.deformer.emplace();
+  return told(deformer.begin(assets, deforming, made.list.records(), stream), deformer);
+}
+
+// Runs the body of a function of assets of which some deform.
+template <typename Body>
+tandem_status with_deformer(tandem_gpu_assets* assets, const Body& body) noexcept {
+  return guarded(assets, [&](tandem_gpu_assets& self) -> tandem_status {
+    if (!self.deformer.has_value()) return TANDEM_ASSETS_MISSING;
+    return body(*self.deformer);
+  });
+}
+
+// Runs a call that deforms assets: call(deformer).
+template <typename Call>
+tandem_status deform(tandem_gpu_assets* assets, const float* const* positions, const Call& call) noexcept {
+  return with_deformer(assets, [&](GpuDeformer& deformer) -> tandem_status {
+    if (!is_there(positions, deformer.bodies())) return TANDEM_NULL_ARGUMENT;
+    return told(call(deformer), deformer);
+  });
 }
 
 }  // namespace
@@ -76,5 +124,55 @@ size_t tandem_gpu_assets_count(const tandem_gpu_assets* assets) {
 }
 
 size_t tandem_gpu_assets_bytes(const tandem_gpu_assets* assets) {
-  return assets != nullptr ? assets->files.bytes() + assets->bounds.bytes() : 0;
+  if (assets == nullptr) return 0;
+  const size_t deformed = assets->deformer.has_value() ? assets->deformer->bytes() : 0;
+  return assets->files.bytes() + assets->list.bytes() + deformed;
+}
+
+tandem_status tandem_gpu_assets_create_deforming(tandem_gpu_assets* assets, const uint32_t* deforming,
+                                                 size_t count, tandem_stream stream,
+                                                 const tandem_allocator* allocator, tandem_gpu_assets** made,
+                                                 uint64_t* where) {
+  if (where != nullptr) *where = 0;
+  if (made == nullptr) return TANDEM_NULL_ARGUMENT;
+  *made = nullptr;
+  if (assets == nullptr || !is_there(deforming, count)) return TANDEM_NULL_ARGUMENT;
+  if (assets->deformer.has_value()) return TANDEM_BAD_OPTION;
+  tandem_status status = TANDEM_OK;
+  const size_t sound = count_of_sound(*assets, {deforming, count}, status);
+  if (where != nullptr && status != TANDEM_OK) *where = sound;
+  if (status != TANDEM_OK) return status;
+  return create(allocator, made, [&](tandem_gpu_assets& of) {
+    return make_deforming(of, *assets, {deforming, count}, stream);
+  });
+}
+
+size_t tandem_gpu_assets_deforming_count(const tandem_gpu_assets* assets) {
+  return assets != nullptr && assets->deformer.has_value() ? assets->deformer->bodies() : 0;
+}
+
+tandem_status tandem_gpu_assets_enqueue_deform(tandem_gpu_assets* assets, const float* const* positions,
+                                               tandem_stream stream) {
+  return deform(assets, positions,
+                [&](GpuDeformer& deformer) { return deformer.enqueue(positions, stream); });
+}
+
+tandem_status tandem_gpu_assets_deform(tandem_gpu_assets* assets, const float* const* positions,
+                                       tandem_stream stream) {
+  return deform(assets, positions, [&](GpuDeformer& deformer) { return deformer.deform(positions, stream); });
+}
+
+const tandem_gpu_deform_report* tandem_gpu_assets_device_report(const tandem_gpu_assets* assets) {
+  if (assets == nullptr || !assets->deformer.has_value()) return nullptr;
+  return reinterpret_cast<const tandem_gpu_deform_report*>(assets->deformer->device_report());
+}
+
+tandem_status tandem_gpu_assets_get_report(const tandem_gpu_assets* assets,
+                                           tandem_gpu_deform_report* report) {
+  if (report != nullptr) *report = {};
+  if (assets == nullptr) return TANDEM_NULL_ARGUMENT;
+  if (!assets->deformer.has_value()) return TANDEM_ASSETS_MISSING;
+  const GpuDeformReport& found = assets->deformer->report();
+  if (report != nullptr) *report = reinterpret_cast<const tandem_gpu_deform_report&>(found);
+  return told(found.status, cudaSuccess);
 }

@@ -4,6 +4,7 @@
 #include <atomic>
 #include <bit>
 #include <functional>
+#include <optional>
 
 #include "entry.h"
 #include "rows.h"
@@ -12,6 +13,7 @@
 #include "tandem/kernels/detail/buffer.h"
 #include "tandem/kernels/gpu_broad_phase.h"
 #include "tandem/kernels/gpu_containment_query.h"
+#include "tandem/kernels/gpu_deformer.h"
 #include "tandem/kernels/gpu_distance_query.h"
 #include "tandem/kernels/gpu_excluded_pairs.h"
 #include "tandem/kernels/gpu_impact_query.h"
@@ -25,11 +27,15 @@ struct tandem_gpu_assets : tandem::Allocated {
   std::atomic<size_t> references = 1;
   tandem::DeviceAssets files;
   tandem::Buffer<tandem::GpuAsset> assets;  ///< the first level that each shows
-  tandem::Buffer<tandem::GpuAsset> levels;  ///< all that they show, asset by asset
-  tandem::GpuArray<tandem::AssetBounds> bounds;
+  tandem::Buffer<tandem::GpuAsset> levels;  ///< all that they show, asset by asset; none where some deform
+  tandem::GpuAssetList list;
   tandem::Allocator allocator;
 
-  tandem::GpuAssetBounds bounds_of_all() const { return {bounds.data(), uint32_t(assets.size())}; }
+  tandem_gpu_assets* at_rest = nullptr;  ///< those that have the files, where some deform
+  std::optional<tandem::GpuDeformer> deformer;
+
+  ~tandem_gpu_assets() { tandem_gpu_assets_release(at_rest); }
+  tandem::GpuAssetBounds bounds_of_all() const { return list.records().bounds_of_all(); }
 };
 
 struct tandem_gpu_excluded_pairs : tandem::Allocated {
@@ -91,6 +97,10 @@ tandem_status take_assets(Of* handle, tandem_gpu_assets* given, const Name& name
     tandem_gpu_assets* const before = self.assets;
     self.assets = nullptr;
     Status status = name(self.query);
+    if constexpr (requires { self.query.follow(given->list.records().assets); }) {
+      if (status == Status::kOk && given->deformer.has_value())
+        status = self.query.follow(given->list.records().assets);
+    }
     if (status == Status::kOk) status = self.query.reserve({});
     tandem_status result = told(status, self.query);
     if (result == TANDEM_OK) {

@@ -1,5 +1,7 @@
 // Written by scripts/write_interface from bindings/c/cuda/include/tandem/tandem_cuda.h. Do not edit it.
 // clang-format off
+struct Same_tandem_gpu_deform_report { using Ours = GpuDeformReport; using Theirs = tandem_gpu_deform_report; TANDEM_SAME_SIZE(); TANDEM_SAME(status);
+  TANDEM_SAME(body); TANDEM_SAME(where); };
 struct Same_tandem_gpu_broad_phase_report { using Ours = GpuBroadPhaseReport; using Theirs = tandem_gpu_broad_phase_report; TANDEM_SAME_SIZE();
   TANDEM_SAME(status); TANDEM_SAME(complete); TANDEM_SAME(where); TANDEM_SAME(count); TANDEM_SAME(found); };
 struct Same_tandem_gpu_query_capacity { using Ours = GpuContactCapacity; using Theirs = tandem_gpu_query_capacity; TANDEM_SAME_SIZE();

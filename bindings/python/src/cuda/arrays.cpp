@@ -87,12 +87,7 @@ void check_cuda(cudaError_t error) {
 }
 
 void check_whole(tandem_status status) {
-  if (status == TANDEM_OK) return;
-  const nb::object error = nb::module_::import_("tandem._errors")
-                               .attr("from_status")(status, tandem_status_name(status),
-                                                    tandem_status_explain(status), nb::none(), 0);
-  PyErr_SetObject(error.type().ptr(), error.ptr());
-  throw nb::python_error();
+  if (status != TANDEM_OK) throw_status(status, tandem_status_explain(status), nullptr, 0);
 }
 
 OnDevice::OnDevice(int device) {

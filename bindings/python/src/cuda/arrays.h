@@ -13,7 +13,7 @@ namespace tandem::python {
 
 inline constexpr dlpack::DataType kU8 = {dlpack::kUInt, 8, 1}, kU32 = {dlpack::kUInt, 32, 1},
                                   kI32 = {dlpack::kInt, 32, 1}, kU64 = {dlpack::kUInt, 64, 1},
-                                  kF64 = {dlpack::kFloat, 64, 1};
+                                  kF32 = {dlpack::kFloat, 32, 1}, kF64 = {dlpack::kFloat, 64, 1};
 
 /// Throws the exception of an error of CUDA's.
 void check_cuda(cudaError_t error);

@@ -87,8 +87,6 @@ struct FoundPairs {
   std::size_t count = 0;
 };
 
-constexpr const char* kBusy = "the query is at work for another thread";
-
 class Query {
  public:
   explicit Query(nb::object assets) : assets_object_(assets), assets_(nb::cast<const Assets&>(assets)) {}

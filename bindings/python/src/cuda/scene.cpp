@@ -1,5 +1,10 @@
 #include "scene.h"
 
+#include <nanobind/stl/vector.h>
+
+#include <string>
+#include <utility>
+
 namespace tandem::python {
 namespace {
 
@@ -10,12 +15,36 @@ std::uint32_t count_of(std::int64_t length, const GivenArray& array) {
 
 }  // namespace
 
-Assets::Assets(nb::list assets, int device, std::uint32_t contents, const Stream& stream) : device_(device) {
+Assets::Assets(nb::list assets, int device, std::uint32_t contents, std::vector<std::uint32_t> deforming,
+               const Stream& stream)
+    : device_(device), deforming_(std::move(deforming)) {
+  const OnDevice current(device);
+  upload(assets, contents, stream);
+  if (deforming_.empty()) return;
+  tandem_gpu_assets* const at_rest = std::exchange(assets_, nullptr);
+  std::uint64_t where = 0;
+  const tandem_status status = [&] {
+    const WithoutLock other_threads_run;
+    const tandem_status made = tandem_gpu_assets_create_deforming(
+        at_rest, deforming_.data(), deforming_.size(), stream, nullptr, &assets_, &where);
+    tandem_gpu_assets_release(at_rest);
+    return made;
+  }();
+  const bool is_about_one = status == TANDEM_UNKNOWN_ASSET || status == TANDEM_NO_SOURCE_VERTICES;
+  if (is_about_one) throw_status(status, tandem_status_explain(status), "asset", deforming_[where]);
+  check_whole(status);
+}
+
+void Assets::upload(nb::list assets, std::uint32_t contents, const Stream& stream) {
   std::vector<tandem_asset*> list;
-  for (nb::handle asset : assets) list.push_back(nb::cast<const Asset&>(asset).get());
+  for (nb::handle asset : assets) {
+    list.push_back(nb::cast<const Asset&>(asset).get());
+    auto info = sized<tandem_asset_info>();
+    check(tandem_asset_get_info(list.back(), &info));
+    source_vertices_.push_back(info.source_vertices);
+  }
   const tandem_upload_options options = {sizeof options, contents};
   std::uint64_t where = 0;
-  const OnDevice current(device);
   const tandem_status status = [&] {
     const WithoutLock other_threads_run;
     return tandem_gpu_assets_upload(list.data(), list.size(), &options, stream, nullptr, &assets_, &where);
@@ -31,6 +60,68 @@ std::shared_ptr<Buffer> Assets::zeros(std::size_t count) const {
   check_cuda(cudaMemset(made->data(), 0, made->bytes()));
   check_cuda(cudaDeviceSynchronize());
   return zeros_ = made;
+}
+
+// A status of the report comes with the vertex to blame, and another one with nothing.
+void Assets::check_report(tandem_status status) const {
+  tandem_gpu_deform_report report;
+  if (status == TANDEM_OK || tandem_gpu_assets_get_report(assets_, &report) != status)
+    return check_whole(status);
+  const std::string sentence = std::string(tandem_status_explain(status)) + " (positions of asset " +
+                               std::to_string(deforming_[report.body]) + ")";
+  throw_status(status, sentence.c_str(), "vertex", report.where);
+}
+
+void Assets::deform(const Positions& positions, const Stream& stream) const {
+  const Turn turn(busy_, kBusy);
+  positions.require_assets(*this);
+  const OnDevice current(device_);
+  const tandem_status status = [&] {
+    const WithoutLock other_threads_run;
+    return tandem_gpu_assets_deform(assets_, positions.get(), stream);
+  }();
+  check_report(status);
+}
+
+void Assets::enqueue_deform(const Positions& positions, const Stream& stream) const {
+  const Turn turn(busy_, kBusy);
+  positions.require_assets(*this);
+  const OnDevice current(device_);
+  check_whole(tandem_gpu_assets_enqueue_deform(assets_, positions.get(), stream));
+  is_queued_ = true;
+}
+
+void Assets::check_queued() const {
+  if (is_queued_) check_report(tandem_gpu_assets_get_report(assets_, nullptr));
+}
+
+Positions::Positions(const Assets& assets, nb::list positions, const Stream& stream) : assets_(&assets) {
+  std::vector<const float*> places;
+  for (const std::uint32_t asset : assets.deforming()) {
+    const nb::object given = positions[places.size()];
+    places.push_back(nullptr);
+    if (given.is_none()) continue;
+    const std::string name = "positions of asset " + std::to_string(asset);
+    GivenArray& array = arrays_.emplace_back(given, name.c_str(), stream, assets.device());
+    array.require_type({kF32}, "float32");
+    const auto count = static_cast<std::int64_t>(assets.source_vertices(asset));
+    if (array.shape() != std::vector<std::int64_t>{count, 3})
+      array.wrong_shape(("(" + std::to_string(count) + ", 3)").c_str());
+    places.back() = static_cast<const float*>(array.data());
+  }
+  const OnDevice current(assets.device());
+  places_ = std::make_shared<Buffer>(places.size() * sizeof(const float*));
+  check_cuda(
+      cudaMemcpyAsync(places_->data(), places.data(), places_->bytes(), cudaMemcpyHostToDevice, stream));
+  const cudaError_t error = [&] {
+    const WithoutLock other_threads_run;
+    return cudaStreamSynchronize(stream);
+  }();
+  check_cuda(error);
+}
+
+void Positions::require_assets(const Assets& assets) const {
+  if (assets_ != &assets) throw nb::value_error("positions were made by another query");
 }
 
 Instances::Instances(const Assets& assets, nb::handle asset, nb::handle pose, const Stream& stream)
@@ -108,9 +199,12 @@ const tandem_gpu_pair_filter* GpuFilter::of(const GpuFilter* filter, const Insta
 
 void add_scenes(nb::module_& module) {
   nb::class_<Assets>(module, "Assets")
-      .def(nb::init<nb::list, int, std::uint32_t, const Stream&>())
+      .def(nb::init<nb::list, int, std::uint32_t, std::vector<std::uint32_t>, const Stream&>())
+      .def("deform", &Assets::deform)
+      .def("enqueue_deform", &Assets::enqueue_deform)
       .def_prop_ro("device", &Assets::device)
       .def_prop_ro("bytes", &Assets::bytes);
+  nb::class_<Positions>(module, "Positions").def(nb::init<const Assets&, nb::list, const Stream&>());
   nb::class_<Instances>(module, "Instances")
       .def(nb::init<const Assets&, nb::handle, nb::handle, const Stream&>(), nb::arg(), nb::arg().none(),
            nb::arg(), nb::arg())

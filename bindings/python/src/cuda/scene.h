@@ -1,4 +1,6 @@
 #pragma once
+#include <atomic>
+
 #include "arrays.h"
 
 namespace tandem::python {
@@ -20,10 +22,16 @@ class Buffer {
   std::size_t bytes_;
 };
 
-/// Copies of assets in the memory of one GPU.
+class Positions;
+
+constexpr const char* kBusy = "the query is at work for another thread";
+
+/// Copies of assets in the memory of one GPU, of which some may deform.
 class Assets {
  public:
-  Assets(nb::list assets, int device, std::uint32_t contents, const Stream& stream);
+  /// deforming: ascending.
+  Assets(nb::list assets, int device, std::uint32_t contents, std::vector<std::uint32_t> deforming,
+         const Stream& stream);
   ~Assets() { tandem_gpu_assets_release(assets_); }
   Assets(const Assets&) = delete;
   Assets& operator=(const Assets&) = delete;
@@ -35,10 +43,45 @@ class Assets {
   /// waits for the device, where there were never as many.
   std::shared_ptr<Buffer> zeros(std::size_t count) const;
 
+  /// Returns the numbers of the assets that deform.
+  const std::vector<std::uint32_t>& deforming() const { return deforming_; }
+  std::uint64_t source_vertices(std::uint32_t asset) const { return source_vertices_[asset]; }
+
+  /// Deforms assets: waits, or queues that alone.
+  void deform(const Positions& positions, const Stream& stream) const;
+  void enqueue_deform(const Positions& positions, const Stream& stream) const;
+  /// Throws what was wrong with the positions of the last call, if calls were queued. Condition: the stream
+  /// has passed it.
+  void check_queued() const;
+
  private:
+  void upload(nb::list assets, std::uint32_t contents, const Stream& stream);
+  void check_report(tandem_status status) const;
+
   tandem_gpu_assets* assets_ = nullptr;
   int device_;
+  std::vector<std::uint32_t> deforming_;
+  std::vector<std::uint64_t> source_vertices_;  // of each asset
+  mutable bool is_queued_ = false;              // some call that deforms was queued, or captured
+  mutable std::atomic<bool> busy_ = false;
   mutable std::shared_ptr<Buffer> zeros_;
+};
+
+/// Positions of assets that deform: somebody's arrays, which are read where they are in every call.
+class Positions {
+ public:
+  /// positions: an array, or None, for each asset that deforms. Waits for the stream.
+  Positions(const Assets& assets, nb::list positions, const Stream& stream);
+  Positions(const Positions&) = delete;
+  Positions& operator=(const Positions&) = delete;
+  const float* const* get() const { return static_cast<const float* const*>(places_->data()); }
+  /// Throws ValueError where they were made for other assets.
+  void require_assets(const Assets& assets) const;
+
+ private:
+  const Assets* assets_;
+  std::vector<GivenArray> arrays_;
+  std::shared_ptr<Buffer> places_;  // of the arrays
 };
 
 /// Bodies: somebody's arrays of assets and poses, which are read where they are in every call.

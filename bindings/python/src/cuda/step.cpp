@@ -86,6 +86,7 @@ nb::tuple Step::wait(nb::handle given, const Stream* stream) {
     return all ? cudaDeviceSynchronize() : cudaStreamSynchronize(waited);
   }();
   check_cuda(error);
+  assets_.check_queued();
   std::uint64_t pairs = 0;
   if (!given.is_none()) {
     pairs = nb::cast<const Pairs&>(given).count();

@@ -50,8 +50,9 @@ TANDEM_API tandem_status tandem_gpu_device_create(const tandem_allocator* alloca
 
 /// ---- Assets in GPU memory
 
-/// Copies of assets in the memory of one GPU: the levels that they show. They never change, and references
-/// are counted, as those of tandem_asset; each handle that is given them has one.
+/// Copies of assets in the memory of one GPU: the levels that they show. They never change but by
+/// tandem_gpu_assets_deform(), and references are counted, as those of tandem_asset; each handle that is
+/// given them has one.
 typedef struct tandem_gpu_assets tandem_gpu_assets;
 
 enum {
@@ -76,8 +77,51 @@ TANDEM_API void tandem_gpu_assets_retain(tandem_gpu_assets* assets);
 /// The last reference frees the memory, which waits for the device. Null does nothing.
 TANDEM_API void tandem_gpu_assets_release(tandem_gpu_assets* assets);
 TANDEM_API size_t tandem_gpu_assets_count(const tandem_gpu_assets* assets);
-/// GPU memory that they hold.
+/// GPU memory that they hold; of assets of which some deform, without what they share with those at rest.
 TANDEM_API size_t tandem_gpu_assets_bytes(const tandem_gpu_assets* assets);
+
+/// ---- Assets that deform
+
+/// The outcome of a call that deforms assets.
+typedef struct tandem_gpu_deform_report {
+  tandem_status status;  ///< TANDEM_OK or TANDEM_OUT_OF_RANGE
+  uint32_t body;   ///< the first array with a coordinate that is NaN or beyond 3.4e38: its place in the call
+  uint64_t where;  ///< the first such vertex
+} tandem_gpu_deform_report;
+
+/// Makes assets of which some deform: those that `deforming` names, ascending, by their places in `assets`.
+/// Each of them gets a tree of its own, which takes 48 bytes a triangle and 240 a block; all else is shared
+/// with `assets`, to which the new ones keep a reference. They are given to queries as other assets are, and
+/// what queries then find is about the deformed shapes. Tolerance queries refuse them (TANDEM_DEFORMED).
+/// Waits for the stream.
+///
+/// Result: TANDEM_UNKNOWN_ASSET; TANDEM_NO_SOURCE_VERTICES, where a file has none or `assets` were uploaded
+/// with TANDEM_CONTENTS_EXACT_QUERIES; TANDEM_BAD_OPTION, where numbers do not ascend or `assets` deform
+/// themselves. where (or null): the place in `deforming`. After an error *made is null.
+TANDEM_API tandem_status tandem_gpu_assets_create_deforming(tandem_gpu_assets* assets,
+                                                            const uint32_t* deforming, size_t count,
+                                                            tandem_stream stream,
+                                                            const tandem_allocator* allocator,
+                                                            tandem_gpu_assets** made, uint64_t* where);
+/// How many of them deform.
+TANDEM_API size_t tandem_gpu_assets_deforming_count(const tandem_gpu_assets* assets);
+/// Queues new shapes for assets that deform; queries that are queued behind it find them.
+///
+/// positions: for each asset that deforms, in their order, x, y, z of each source vertex in float32, in the
+/// file's coordinates, as many as tandem_asset_info says; null: the asset stays as it is. The array of
+/// pointers lies in GPU memory too, and is read when the stream comes to it: a graph that captured the call
+/// may be launched with other pointers in it. An asset whose positions are bad stays as it is, and the report
+/// says so. Where a deformed asset is that of a fixed instance, call tandem_gpu_broad_phase_keep_fixed()
+/// again. Result: TANDEM_ASSETS_MISSING where none deform.
+TANDEM_API tandem_status tandem_gpu_assets_enqueue_deform(tandem_gpu_assets* assets,
+                                                          const float* const* positions,
+                                                          tandem_stream stream);
+/// Deforms assets and waits. Result: as of enqueue, or TANDEM_OUT_OF_RANGE, where the report says which.
+TANDEM_API tandem_status tandem_gpu_assets_deform(tandem_gpu_assets* assets, const float* const* positions,
+                                                  tandem_stream stream);
+TANDEM_API const tandem_gpu_deform_report* tandem_gpu_assets_device_report(const tandem_gpu_assets* assets);
+TANDEM_API tandem_status tandem_gpu_assets_get_report(const tandem_gpu_assets* assets,
+                                                      tandem_gpu_deform_report* report);
 
 /// ---- Scenes in GPU memory
 

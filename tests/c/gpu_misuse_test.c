@@ -100,7 +100,7 @@ static void test_handles(void) {
               tandem_gpu_broad_phase_reserve(handle, &capacity, NULL),
               tandem_gpu_broad_phase_pairs(handle).pairs);
   TEST_HANDLE(tandem_gpu_broad_phase, tandem_gpu_broad_phase_enqueue(handle, &bodies, NULL, NULL),
-              tandem_gpu_broad_phase_keep_fixed(handle, &bodies, NULL, NULL),
+              tandem_gpu_broad_phase_keep_fixed(handle, &bodies, NULL, NULL, NULL),
               tandem_gpu_broad_phase_pairs(handle).count);
   TEST_HANDLE(tandem_gpu_contact_query, tandem_gpu_contact_query_find(handle, &bodies, &pairs, NULL, NULL),
               tandem_gpu_contact_query_reserve(handle, &capacity, NULL),

@@ -150,7 +150,7 @@ static void test_filters(void) {
   const tandem_object_pair* pairs = tandem_scene_pairs(expected, TANDEM_PAIRS, &count);
   for (int kept = 0; kept < 2; ++kept) {
     if (kept)
-      CHECK_STATUS(tandem_gpu_broad_phase_keep_fixed(queries.near, &scene.instances, motion, stream),
+      CHECK_STATUS(tandem_gpu_broad_phase_keep_fixed(queries.near, &scene.instances, motion, NULL, stream),
                    TANDEM_OK);
     CHECK_STATUS(tandem_gpu_broad_phase_find(queries.near, &scene.instances, &near, stream), TANDEM_OK);
     tandem_gpu_broad_phase_report report;

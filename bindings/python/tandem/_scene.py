@@ -147,6 +147,14 @@ class Filter:
         return self._given[0]
 
 
+def _of_all(given: Any) -> Any:
+    """What is given of each body of each configuration, of all one after the other."""
+    if given is None:
+        return None
+    array = np.asarray(given.as_matrix() if hasattr(given, "as_matrix") else given)
+    return array.reshape(-1, *array.shape[2:])
+
+
 def _core_of(filter: Filter | None) -> _tandem.Filter | None:
     if filter is None:
         return None
@@ -503,8 +511,7 @@ class Scene:
         ([False, True], [(1, 0, 1)])
         """
         moving = np.atleast_1d(whole_numbers(bodies, "bodies"))
-        flat = [None if given is None else np.reshape(np.asarray(given), (-1, *np.shape(given)[2:])) for given in (rotation, translation, transform)]
-        poses = instances_of(None, None, *flat)
+        poses = instances_of(None, None, *map(_of_all, (rotation, translation, transform)))
         count = len(poses) // len(moving) if len(moving) else 0
         try:
             pairs = _frombuffer(self._core.configurations(moving, poses, amount(within, "within", FARTHEST), flag(all_pairs, "all_pairs")), CONFIGURATION_PAIR)

@@ -321,7 +321,7 @@ def check(scene: jobs.FileScene, configurations: npt.ArrayLike | Rows, *, pairs:
 
 
 def check(scene: jobs.FileScene, configurations: npt.ArrayLike | Rows, *, pairs: bool = False, client: distributed.Client | None = None) -> Any:
-    """Says of configurations of the moving bodies of a scene whether anything touches: exactly, by `tandem.Scene.contacts` of each.
+    """Says of configurations of the moving bodies of a scene whether anything touches, as `tandem.Scene.configurations` does.
 
     A worker opens the scene once; a task gets some of the configurations.
 

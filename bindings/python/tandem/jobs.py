@@ -16,7 +16,7 @@ import json
 import os
 import threading
 import uuid
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -29,7 +29,7 @@ from ._asset import Asset
 from ._build import Effort, Levels, Mesh, _words, build, read_mesh
 from ._errors import Error
 from ._rows import CONTACT, INSTANCE, PAIR
-from ._scene import Contacts, Counters, Filter, Scene
+from ._scene import Configurations, Contacts, Counters, Filter, Scene
 
 __all__ = ["AssetFile", "BuildOptions", "Built", "FileScene", "NotWritten", "Slice", "TOUCHING", "ask", "build_file", "divide", "file_of", "join", "touching", "verdicts"]
 
@@ -361,32 +361,19 @@ def _kept(scene: FileScene) -> Scene:
     return _opened.scene
 
 
-def _touching_of_each(scene: Scene, moving: npt.NDArray[np.uint32], poses: Rows) -> Iterator[Rows]:
-    """The pairs that touch, of one configuration after the other."""
-    for configuration in poses:
-        scene.move(moving, configuration)
-        yield scene.contacts(first_contact_only=True).touching
-
-
-def _verdicts(scene: Scene, moving: npt.NDArray[np.uint32], poses: Rows) -> npt.NDArray[np.bool_]:
-    """Says of each configuration whether anything touches."""
-    return np.fromiter((len(pairs) > 0 for pairs in _touching_of_each(scene, moving, poses)), bool, len(poses))
+def _answered(scene: FileScene, poses: Rows, all_pairs: bool) -> Configurations:
+    return _kept(scene).configurations(scene.moving, rotation=poses["rotation"], translation=poses["translation"], all_pairs=all_pairs)
 
 
 def verdicts(scene: FileScene, poses: Rows) -> npt.NDArray[np.bool_]:
-    """Says of each configuration, row of an array of `FileScene.configurations`, whether any pair of bodies touches, (k,). A thread keeps the last scene open.
+    """Says of each configuration, row of an array of `FileScene.configurations`, whether a body that moves touches another, (k,). A thread keeps the last scene open.
 
     Raises:
         FileError, Error: as `FileScene.open`.
     """
-    return _verdicts(_kept(scene), scene.moving, poses)
+    return _answered(scene, poses, False).touching
 
 
 def touching(scene: FileScene, poses: Rows) -> Rows:
     """Finds the pairs that touch in each configuration, as `verdicts` says whether there are any: array of TOUCHING, by configuration, then by pair."""
-    each = list(_touching_of_each(_kept(scene), scene.moving, poses))
-    found = np.empty(sum(map(len, each)), TOUCHING)
-    found["configuration"] = np.repeat(np.arange(len(each)), [len(pairs) for pairs in each])
-    for name in ("a", "b"):
-        found[name] = np.concatenate([pairs[name] for pairs in each]) if each else []
-    return found
+    return _answered(scene, poses, True).pairs.astype(TOUCHING)

@@ -47,7 +47,7 @@ std::uint32_t motions_that_meet(Motion one) {
 
 }  // namespace
 
-bool BroadPhase::Tree::reserve(std::size_t boxes, const PairFilter& filter) {
+bool BoxTree::reserve(std::size_t boxes, const PairFilter& filter) {
   std::size_t total = 0;
   levels = 0;
   for (std::size_t below = boxes; levels == 0 || below > 1; below = groups_over(below)) {
@@ -432,6 +432,16 @@ Status BroadPhase::keep_fixed(std::span<const WorldBox> boxes, std::span<const M
   if (fixed == 0) return Status::kOk;
   build(boxes, {}, kept_, team);
   kept_of_ = boxes.size();
+  return Status::kOk;
+}
+
+Status BroadPhase::make_tree(std::span<const WorldBox> boxes, WorkerThreads& threads, std::uint32_t workers) {
+  const Team team = {threads, workers};
+  pairs_.clear();
+  if (boxes.size() >= kNoIndex) return Status::kTooManyInstances;
+  if (!tree_.reserve(boxes.size(), {})) return Status::kOutOfMemory;
+  if (!take(boxes, nullptr, tree_, team)) return Status::kOutOfRange;
+  if (!boxes.empty()) build(boxes, {}, tree_, team);
   return Status::kOk;
 }
 

@@ -302,6 +302,7 @@ Status ClosestQuery::answer(SceneState& scene, const ClosestOptions& options) {
     ClosestSearch& search = state.searches[worker];
     for (std::size_t i = first; i < last; ++i) {
       const std::uint32_t body = search.best_body, triangle = search.best_triangle;
+      fetch_ahead(options.points[state.order.ahead(i)].data());
       search.begin(options.points[state.order[i]], options.reach);
       if (i % kProbesAtOnce != 0 && triangle != kNoIndex) {
         search.body = body;

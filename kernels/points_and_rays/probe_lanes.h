@@ -126,14 +126,23 @@ struct WaitingNode {
 
 inline constexpr std::uint32_t kMostWaitingNodes = 3 * kMaxDepth + 4;
 
+/// Has the machine load a block that is visited soon.
+inline void fetch_block([[maybe_unused]] const Block* block) {
+#ifdef TANDEM_HAVE_LANES
+  __builtin_prefetch(block);
+  __builtin_prefetch(reinterpret_cast<const char*>(block) + 64);
+#endif
+}
+
 /// Pushes the nodes of the mask, the nearest last.
 template <typename Four>
-inline void push_nodes(const Block& block, const Four& near, unsigned mask, WaitingNode* stack,
+inline void push_nodes(const Block* blocks, const Block& block, const Four& near, unsigned mask, WaitingNode* stack,
                        std::uint32_t& height) {
   const std::uint32_t bottom = height;
   for (; mask != 0; mask &= mask - 1) {
     const int i = lowest_bit(mask);
     const WaitingNode next = {block.index[i], near.v[i]};
+    fetch_block(blocks + next.block);
     std::uint32_t at = height++;
     for (; at > bottom && stack[at - 1].near < next.near; --at) stack[at] = stack[at - 1];
     stack[at] = next;
@@ -170,7 +179,7 @@ class RayWalkBy {
             block_number = block.index[lowest_bit(mask)];
             continue;
           }
-          push_nodes(block, near, mask, stack, height);
+          push_nodes(task_.tree->blocks, block, near, mask, stack, height);
         }
       }
       do {
@@ -267,7 +276,7 @@ class PointWalkBy {
         if (block.is_leaf_block()) {
           take(block, mask);
         } else {
-          push_nodes(block, bound, mask, stack, height);
+          push_nodes(task_.tree->blocks, block, bound, mask, stack, height);
         }
       }
       do {

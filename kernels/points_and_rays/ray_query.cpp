@@ -197,13 +197,15 @@ Status RayQuery::answer(SceneState& scene, const RayOptions& options) {
   if (const Status status = state.bodies.make(scene); status != Status::kOk) return status;
   const std::uint32_t workers = scene.workers_for(count, kProbesAtOnce);
   if (!scene.threads.provide(workers)) return scene.fail(Status::kCannotStartThread, 0);
+  // Rays that enter the scene near each other follow each other; those that miss it come first.
+  const WorldBox bounds = state.bodies.bounds();
   const auto place = [&](std::size_t i, double* out) {
-    for (int k = 0; k < 3; ++k) {
-      out[k] = options.directions[i][k];
-      out[3 + k] = options.origins[i][k];
-    }
+    const WorldRay ray = world_ray(options.origins[i].data(), options.directions[i].data(), HUGE_VAL);
+    double first = 0, last = HUGE_VAL;
+    if (!meets_box(ray.origin, ray.scaled, bounds.lo, bounds.hi, first, last)) first = 0;
+    for (int k = 0; k < 3; ++k) out[k] = ray.origin[k] + first * ray.scaled[k];
   };
-  if (!state.workers.provide(workers) || !state.order.make<6>(count, place) ||
+  if (!state.workers.provide(workers) || !state.order.make<3>(count, place) ||
       !rows_.resize(all ? 0 : count) || !state.begin.resize(all ? count + 1 : 0))
     return scene.fail(Status::kOutOfMemory, 0);
   for (std::uint32_t i = 0; i < workers; ++i) {
@@ -216,7 +218,10 @@ Status RayQuery::answer(SceneState& scene, const RayOptions& options) {
     State::Worker& worker = state.workers[number];
     RaySearch& search = worker.search;
     for (; i < end && worker.enough_memory; ++i) {
-      const std::uint32_t ray = state.order[i];
+      const std::uint32_t ray = state.order[i], soon = state.order.ahead(i);
+      fetch_ahead(options.origins[soon].data());
+      fetch_ahead(options.directions[soon].data());
+      if (!all) fetch_ahead(&rows_[soon]);
       state.find(scene, options, ray, search);
       if (!all) {
         rows_[ray] = search.found ? row_of(scene, ray, search.best)

@@ -10,8 +10,13 @@ Status ProbedBodies::make(SceneState& scene) {
   assets_id_ = 0;
   const std::size_t count = scene.bodies.size();
   if (!frames_.resize(count)) return scene.fail(Status::kOutOfMemory, 0);
+  bounds_ = {{HUGE_VAL, HUGE_VAL, HUGE_VAL}, {-HUGE_VAL, -HUGE_VAL, -HUGE_VAL}};
   for (std::uint32_t i = 0; i < count; ++i) {
     if (!scene.is_body(i)) continue;
+    for (int k = 0; k < 3; ++k) {
+      bounds_.lo[k] = std::fmin(bounds_.lo[k], scene.boxes[i].lo[k]);
+      bounds_.hi[k] = std::fmax(bounds_.hi[k], scene.boxes[i].hi[k]);
+    }
     const SceneAsset& asset = scene.asset_of(i);
     frames_[i] = local_frame(scene.bodies[i].pose, scene.bodies[i].extent, asset.lower, asset.upper);
   }

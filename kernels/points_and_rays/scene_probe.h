@@ -31,6 +31,9 @@ class ProbedBodies {
 
   const LocalFrame& frame(std::uint32_t body) const { return frames_[body]; }
 
+  /// The box of all bodies; empty where there are none.
+  const WorldBox& bounds() const { return bounds_; }
+
   /// Visits bodies in about the order of a bound: bound(world box) -> double is not above what it is for
   /// anything in the box, and infinity where nothing there counts. Those with a bound of more than `limit` are
   /// passed over; visit(body) may make that less.
@@ -72,8 +75,16 @@ class ProbedBodies {
  private:
   std::uint64_t assets_id_ = 0, shapes_id_ = 0, version_ = 0;  // of what this is made
   Buffer<LocalFrame> frames_;
+  WorldBox bounds_;
   BroadPhase boxes_;
 };
+
+/// Has the machine load what is read soon.
+inline void fetch_ahead([[maybe_unused]] const void* data) {
+#if defined(__GNUC__)
+  __builtin_prefetch(data);
+#endif
+}
 
 /// Says where things lie that are to be ordered: numbers in the same units in a box.
 class ProbeOrder {
@@ -85,11 +96,15 @@ class ProbeOrder {
 
   std::uint32_t operator[](std::size_t i) const { return static_cast<std::uint32_t>(keys_[i]); }
 
+  /// The thing whose data are to be fetched when thing i is looked at.
+  std::uint32_t ahead(std::size_t i) const { return (*this)[i + kAhead < keys_.size() ? i + kAhead : i]; }
+
  private:
   bool sort();
 
   Buffer<std::uint64_t> keys_, other_;  // a key of kKeyBits in the upper half, a number in the lower
   static constexpr int kKeyBits = 30;
+  static constexpr std::size_t kAhead = 8;
 };
 
 template <int kNumbers, typename Place>

@@ -87,8 +87,7 @@ class ExactRay {
 
   TANDEM_HD ExactRay(const double* origin, const double* direction, const RayUnits& units)
       : origin_(origin), units_(units), n_(units.words() < 2 ? 2 : units.words()) {
-    for (int k = 0; k < 3; ++k)
-      d_.x[k].assign_difference(direction[k], 0, units.direction.unit, n_);
+    for (int k = 0; k < 3; ++k) d_.x[k].assign_difference(direction[k], 0, units.direction.unit, n_);
     one_.assign_difference(1, 0, -52, 2);
   }
 

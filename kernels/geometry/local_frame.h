@@ -28,9 +28,9 @@
 /// **Rays.** The direction is scaled by a power of two so that its largest coordinate is from 1 to 2, which
 /// multiplies parameters by another. What reaches the body's box, in float64 with `margin` for all errors,
 /// runs from tau_0 to tau_1; the float32 ray begins at tau_0, so that no coordinate is larger than the
-/// body's. A point of the ray at tau_0 + tau is o + tau d in float32 numbers, off by at most a_i + length b_i,
-/// a and b being the errors of o and d. A coordinate of d below 2^-60 becomes 2^-60, so that its inverse is
-/// finite; b has the difference.
+/// body's. A point of the ray at tau_0 + tau is o + tau d in float32 numbers, off by at most a_i + length
+/// b_i, a and b being the errors of o and d. A coordinate of d below 2^-60 becomes 2^-60, so that its inverse
+/// is finite; b has the difference.
 ///
 /// Box test: with m = (c - o) / d and r = (h + slack) / |d|, the ray is in the box from m - r to m + r along
 /// each axis. m as computed is off by 3.1 u |c - o| / |d|, r by 3.1 u of itself, and each difference by u
@@ -40,8 +40,8 @@
 /// the least of the upper ends at least tau.
 ///
 /// Triangle test: w_i of ray_triangle.h, of corners less o, in float32. A coordinate of p_i = v_i - o is off
-/// by at most E = max(error_k + a_k) and u |p|; one of an edge by 2 S = 2 max error_k and u |e|; one of d by B
-/// = max b_k. With P, e and D the largest magnitudes of coordinates, or bounds of them, D_1 >= sum |d_k|, a
+/// by at most E = max(error_k + a_k) and u |p|; one of an edge by 2 S = 2 max error_k and u |e|; one of d by
+/// B = max b_k. With P, e and D the largest magnitudes of coordinates, or bounds of them, D_1 >= sum |d_k|, a
 /// coordinate of p x e is off by at most 2 ((u P + E) e + P (u e + 2 S) + (u P + E) (u e + 2 S)) for its
 /// factors and 3.1 u 2 P e for its rounding; and w by D_1 times that, B 3 (2 P e) for d, and 3.1 u D_1 2 P e
 /// for rounding. All together, below
@@ -186,9 +186,9 @@ TANDEM_HD inline bool meets_box(const double (&origin)[3], const double (&direct
 /// A ray as float32 has it in a body's frame.
 struct LocalRay {
   float o[3], d[3], inverse[3], slack[3];
-  float length;                     ///< tau_1 - tau_0, rounded up
-  float edge_factor, least_bound;   ///< of the triangle test: least_bound + edge_factor e
-  double start;                     ///< tau_0
+  float length;                    ///< tau_1 - tau_0, rounded up
+  float edge_factor, least_bound;  ///< of the triangle test: least_bound + edge_factor e
+  double start;                    ///< tau_0
 };
 
 enum class RayReach : std::uint8_t { misses, in_frame, out_of_range };
@@ -253,8 +253,7 @@ TANDEM_HD inline RayReach local_ray(const LocalFrame& frame, const WorldRay& wor
   }
   if (!(off <= kLargestInFrame && length <= kLargestInFrame)) return RayReach::out_of_range;
   const double s = static_cast<double>(frame.largest_error);
-  out.edge_factor =
-      rounded_up(1.001 * ((17 * 0x1p-24 * d_1 + 6.1 * d_off) * largest + 2.1 * d_1 * off));
+  out.edge_factor = rounded_up(1.001 * ((17 * 0x1p-24 * d_1 + 6.1 * d_off) * largest + 2.1 * d_1 * off));
   out.least_bound = rounded_up(1.001 * 4.3 * d_1 * s * (largest + off) + 0x1p-70);
   out.length = rounded_up(length);
   out.start = start;

@@ -97,8 +97,7 @@ TANDEM_HD inline int exact_side(const double (&origin)[3], const double (&direct
 }
 
 /// The first parameter and the weights in whole numbers. False: the ray does not meet the triangle.
-TANDEM_OUT_OF_LINE TANDEM_HD inline bool find_exactly(const double (&origin)[3],
-                                                      const double (&direction)[3],
+TANDEM_OUT_OF_LINE TANDEM_HD inline bool find_exactly(const double (&origin)[3], const double (&direction)[3],
                                                       const double (&corner)[3][3], Meeting& out) {
   constexpr int kFew = 8;
   exact::RayUnits units;
@@ -111,16 +110,15 @@ TANDEM_OUT_OF_LINE TANDEM_HD inline bool find_exactly(const double (&origin)[3],
 
 /// The sign of the difference of the parameters at which a ray meets two triangles, both of which it meets.
 TANDEM_OUT_OF_LINE TANDEM_HD inline int compare_exactly(const double (&origin)[3],
-                                                        const double (&direction)[3],
-                                                        const double (&a)[3][3], const double (&b)[3][3]) {
+                                                        const double (&direction)[3], const double (&a)[3][3],
+                                                        const double (&b)[3][3]) {
   constexpr int kFew = 8;
   exact::RayUnits units;
   units.include(origin, direction);
   units.include(a);
   units.include(b);
-  return units.words() <= kFew
-             ? exact::compare_meetings<kFew>(origin, direction, a, b, units)
-             : exact::compare_meetings<detail::kMaxWords>(origin, direction, a, b, units);
+  return units.words() <= kFew ? exact::compare_meetings<kFew>(origin, direction, a, b, units)
+                               : exact::compare_meetings<detail::kMaxWords>(origin, direction, a, b, units);
 }
 
 /// Returns whether a ray meets a triangle, which it does, at a parameter of at most `last`, which is finite.

@@ -20,9 +20,9 @@ struct ClosestSearch {
   DistanceTolerance tolerance;
   double point[3];
   std::uint32_t body;
-  double upper;   // of the distance; before one is found, what is at least so far is beyond reach
-  double lower;   // what was settled is not nearer
-  double floor;   // nor is what was passed over
+  double upper;  // of the distance; before one is found, what is at least so far is beyond reach
+  double lower;  // what was settled is not nearer
+  double floor;  // nor is what was passed over
   TriangleDistance best;
   std::uint32_t best_body, best_triangle;  // of `best`; kNoIndex: none
 
@@ -90,7 +90,8 @@ double distance_to(const WorldBox& box, const double (&p)[3]) {
 
 // Whether the ray of inside_test.h may meet a box.
 bool may_cross(const WorldBox& box, const double (&p)[3]) {
-  return box.lo[1] <= p[1] && p[1] <= box.hi[1] && box.lo[2] <= p[2] && p[2] <= box.hi[2] && p[0] <= box.hi[0];
+  return box.lo[1] <= p[1] && p[1] <= box.hi[1] && box.lo[2] <= p[2] && p[2] <= box.hi[2] &&
+         p[0] <= box.hi[0];
 }
 
 // A walk by world boxes in float64, of a body that float32 cannot take. wanted(box), take(triangle).
@@ -174,7 +175,8 @@ Status ClosestQuery::State::label(SceneState& scene) {
     const bool any_closed =
         std::any_of(level.components, level.components + level.component_count, is_closed);
     const bool labelled = any_closed && !level.closed;
-    if (total >= kNoIndex || !surfaces.push({any_closed, labelled ? static_cast<std::uint32_t>(total) : kNoIndex}))
+    if (total >= kNoIndex ||
+        !surfaces.push({any_closed, labelled ? static_cast<std::uint32_t>(total) : kNoIndex}))
       return scene.fail(Status::kOutOfMemory, i);
     if (labelled) total += level.triangle_count;
   }
@@ -207,15 +209,23 @@ void ClosestQuery::State::walk_body(ClosestSearch& search) const {
   search.blocks += task.blocks;
 }
 
-void ClosestQuery::State::find(const ClosestOptions& options, ClosestSearch& search, ClosestPoint& row) const {
+void ClosestQuery::State::find(const ClosestOptions& options, ClosestSearch& search,
+                               ClosestPoint& row) const {
   const auto bound = [&](const WorldBox& box) { return distance_to(box, search.point); };
   bodies.visit(bound, search.upper, [&](std::uint32_t body) {
     if (!search.scene->is_body(body)) return;
     search.body = body;
     walk_body(search);
   });
-  row = {std::min({search.lower, search.floor, search.upper}), HUGE_VAL, {}, kNoIndex, kNoIndex, kNoIndex,
-         kNoIndex, 0, 0};
+  row = {std::min({search.lower, search.floor, search.upper}),
+         HUGE_VAL,
+         {},
+         kNoIndex,
+         kNoIndex,
+         kNoIndex,
+         kNoIndex,
+         0,
+         0};
   if (search.best_triangle != kNoIndex && row.lower <= options.reach) {
     row.upper = std::min(search.upper, search.best.interval.upper);
     std::copy_n(search.best.point_a, 3, row.position);
@@ -249,15 +259,17 @@ void ClosestQuery::State::count_crossings(std::uint32_t body, ClosestSearch& sea
 
 void ClosestQuery::State::find_sides(ClosestSearch& search, ClosestPoint& row) const {
   const double limit = 0;
-  const auto bound = [&](const WorldBox& box) {
-    return distance_to(box, search.point) == 0 ? 0 : HUGE_VAL;
-  };
+  const auto bound = [&](const WorldBox& box) { return distance_to(box, search.point) == 0 ? 0 : HUGE_VAL; };
   bodies.visit(bound, limit, [&](std::uint32_t body) {
     if (!search.scene->is_body(body)) return;
     const SurfaceLabels& surface = surfaces[search.scene->instances[body].asset];
     if (!surface.any_closed) return;
-    CrossingCount count = {&search.scene->bodies[body], search.point,
-                           surface.first != kNoIndex ? labels.data() + surface.first : nullptr, 0, 0, 0};
+    CrossingCount count = {&search.scene->bodies[body],
+                           search.point,
+                           surface.first != kNoIndex ? labels.data() + surface.first : nullptr,
+                           0,
+                           0,
+                           0};
     count_crossings(body, search, count);
     row.winding += count.winding;
     if (count.crossings % 2 != 0) row.within = std::min(row.within, body);

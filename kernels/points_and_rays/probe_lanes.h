@@ -136,8 +136,8 @@ inline void fetch_block([[maybe_unused]] const Block* block) {
 
 /// Pushes the nodes of the mask, the nearest last.
 template <typename Four>
-inline void push_nodes(const Block* blocks, const Block& block, const Four& near, unsigned mask, WaitingNode* stack,
-                       std::uint32_t& height) {
+inline void push_nodes(const Block* blocks, const Block& block, const Four& near, unsigned mask,
+                       WaitingNode* stack, std::uint32_t& height) {
   const std::uint32_t bottom = height;
   for (; mask != 0; mask &= mask - 1) {
     const int i = lowest_bit(mask);

@@ -35,8 +35,8 @@ class ProbedBodies {
   const WorldBox& bounds() const { return bounds_; }
 
   /// Visits bodies in about the order of a bound: bound(world box) -> double is not above what it is for
-  /// anything in the box, and infinity where nothing there counts. Those with a bound of more than `limit` are
-  /// passed over; visit(body) may make that less.
+  /// anything in the box, and infinity where nothing there counts. Those with a bound of more than `limit`
+  /// are passed over; visit(body) may make that less.
   template <typename Bound, typename Visit>
   void visit(const Bound& bound, const double& limit, const Visit& visit) const {
     const BoxTree& tree = boxes_.tree();

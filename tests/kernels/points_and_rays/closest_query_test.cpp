@@ -38,7 +38,8 @@ std::vector<Vector> hostile_points(RandomPoses& random, const std::vector<std::v
                                    int count) {
   double size = 0;
   for (const auto& body : bodies) {
-    for (const auto& t : body) size = std::max({size, std::abs(t[0][0]), std::abs(t[0][1]), std::abs(t[0][2])});
+    for (const auto& t : body)
+      size = std::max({size, std::abs(t[0][0]), std::abs(t[0][1]), std::abs(t[0][2])});
   }
   std::vector<Vector> points;
   for (int i = 0; i < count; ++i) {
@@ -47,7 +48,7 @@ std::vector<Vector> hostile_points(RandomPoses& random, const std::vector<std::v
     Vector p;
     const double a = random.symmetric(2), b = i % 3 == 0 ? random.symmetric(2) : 0;
     for (std::size_t k = 0; k < 3; ++k) {
-      p[k] = i % 5 == 0 ? random.symmetric(3 * size)
+      p[k] = i % 5 == 0   ? random.symmetric(3 * size)
              : i % 5 == 1 ? t[0][k]
                           : t[0][k] + a * (t[1][k] - t[0][k]) + b * (t[2][k] - t[0][k]);
     }
@@ -232,8 +233,7 @@ TEST(ClosestPoints, EveryWayOffersTheSameCandidates) {
   assets.add(test::soup(random, 300, 0.2));
   const LevelView level = assets.views()[0].level();
   const FileHeader& header = *assets.views()[0].header;
-  const LocalFrame frame =
-      local_frame(kIdentityPose, extent_of(level.blocks[0]), header.lower, header.upper);
+  const LocalFrame frame = local_frame(kIdentityPose, extent_of(level.blocks[0]), header.lower, header.upper);
   using Offered = std::vector<std::pair<float, std::uint32_t>>;
   const auto offered_by = [&](PointWalk walk, const Vector& point, Offered& out) {
     PointTask task;

@@ -27,7 +27,9 @@ struct Rays {
     origins.push_back(from);
     directions.push_back(along);
   }
-  RayOptions options(RayHits hits) const { return {.origins = origins, .directions = directions, .hits = hits}; }
+  RayOptions options(RayHits hits) const {
+    return {.origins = origins, .directions = directions, .hits = hits};
+  }
 };
 
 Vector random_vector(RandomPoses& random, double size) {
@@ -128,7 +130,8 @@ void expect_hit(const RayHit& row, const OracleHit& expected) {
   EXPECT_EQ(row.triangle, expected.triangle);
   EXPECT_TRUE(expected.oracle.is_near(row.t, kRayTimeError)) << row.t;
   if (expected.oracle.is_plain()) {
-    EXPECT_TRUE(expected.oracle.has_weights(row.weight, kRayWeightError)) << row.weight[0] << ' ' << row.weight[1];
+    EXPECT_TRUE(expected.oracle.has_weights(row.weight, kRayWeightError))
+        << row.weight[0] << ' ' << row.weight[1];
   }
 }
 
@@ -230,8 +233,7 @@ TEST(Rays, EveryWayNamesTheSameTriangles) {
   assets.add(test::soup(random, 300, 0.2));
   const LevelView level = assets.views()[0].level();
   const FileHeader& header = *assets.views()[0].header;
-  const LocalFrame frame =
-      local_frame(kIdentityPose, extent_of(level.blocks[0]), header.lower, header.upper);
+  const LocalFrame frame = local_frame(kIdentityPose, extent_of(level.blocks[0]), header.lower, header.upper);
   const auto named_by = [&](RayWalk walk, const WorldRay& ray, std::vector<std::uint32_t>& out) {
     RayTask task;
     if (local_ray(frame, ray, HUGE_VAL, task.ray) != RayReach::in_frame) return;

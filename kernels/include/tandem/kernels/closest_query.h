@@ -17,7 +17,7 @@ struct ClosestPoint {
   std::uint32_t triangle;  ///< in leaf order
   std::uint32_t face;      ///< of the source file, that the triangle comes from
   std::uint32_t within;    ///< the lowest body that the point is inside of; kNoIndex: none, or not asked
-  std::int32_t winding;    ///< how often the closed surfaces of all bodies wind around the point; 0: not asked
+  std::int32_t winding;  ///< how often the closed surfaces of all bodies wind around the point; 0: not asked
   std::uint32_t reserved;  ///< 0
 
   friend bool operator==(const ClosestPoint&, const ClosestPoint&) = default;

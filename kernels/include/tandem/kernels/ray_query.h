@@ -10,12 +10,12 @@ namespace tandem {
 
 /// A place where a ray meets a triangle of a body.
 struct RayHit {
-  double t;                  ///< the parameter, within kRayTimeError of itself; infinite: there is no hit
-  double weight[2];          ///< of corners 1 and 2, within kRayWeightError; corner 0 has what is left of 1
-  std::uint32_t ray;         ///< its place in the list of rays
-  std::uint32_t body;        ///< kNoIndex: there is no hit
-  std::uint32_t triangle;    ///< in leaf order
-  std::uint32_t face;        ///< of the source file, that the triangle comes from
+  double t;                ///< the parameter, within kRayTimeError of itself; infinite: there is no hit
+  double weight[2];        ///< of corners 1 and 2, within kRayWeightError; corner 0 has what is left of 1
+  std::uint32_t ray;       ///< its place in the list of rays
+  std::uint32_t body;      ///< kNoIndex: there is no hit
+  std::uint32_t triangle;  ///< in leaf order
+  std::uint32_t face;      ///< of the source file, that the triangle comes from
 
   friend bool operator==(const RayHit&, const RayHit&) = default;
 };
@@ -30,14 +30,15 @@ inline constexpr double kRayTimeError = 0x1p-40;
 inline constexpr double kRayWeightError = 0x1p-30;
 
 enum class RayHits : std::uint32_t {
-  first,  ///< a row for each ray, with the hit of the least parameter; of several, the lowest body and triangle
+  first,  ///< a row for each ray, with the hit of the least parameter; of several, the lowest body and
+          ///< triangle
   any,    ///< a row for each ray, with some hit if there is one; which one is unspecified
   all,    ///< a row for each triangle that a ray meets, by ascending ray, parameter, body and triangle
 };
 
 struct RayOptions {
-  std::span<const std::array<double, 3>> origins;     ///< in the world
-  std::span<const std::array<double, 3>> directions;  ///< of any length, as many
+  std::span<const std::array<double, 3>> origins;          ///< in the world
+  std::span<const std::array<double, 3>> directions;       ///< of any length, as many
   double reach = std::numeric_limits<double>::infinity();  ///< the greatest parameter that counts
   RayHits hits = RayHits::first;
 };
@@ -53,10 +54,10 @@ struct RayCounters {
 };
 
 /// Finds where rays meet the bodies of a scene. A ray is the set of points origin + t direction, 0 <= t <=
-/// reach, in exact arithmetic; the geometry is that of ContactQuery: the posed vertices in float64, and closed
-/// triangles. Whether a ray meets a triangle, and which of its hits is first, is decided exactly: no ray slips
-/// through an edge or a corner, and one that meets an edge meets both triangles. A ray in the plane of a
-/// triangle meets it where it first touches it. The filter is not asked, and pairs() are none.
+/// reach, in exact arithmetic; the geometry is that of ContactQuery: the posed vertices in float64, and
+/// closed triangles. Whether a ray meets a triangle, and which of its hits is first, is decided exactly: no
+/// ray slips through an edge or a corner, and one that meets an edge meets both triangles. A ray in the plane
+/// of a triangle meets it where it first touches it. The filter is not asked, and pairs() are none.
 class RayQuery : public Answer<RayHit, RayCounters> {
  public:
   using Options = RayOptions;

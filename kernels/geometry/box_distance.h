@@ -76,6 +76,7 @@ TANDEM_HD inline double lack_of_orthonormality(const Real (&m)[3][3]) {
 /// are far from orthonormal.
 TANDEM_HD inline bool bound_lengths(const double (&inverse)[3][3], double of_m, FrameLengths& lengths) {
   const double of_a = distance::lack_of_orthonormality(inverse);
+  lengths = {};
   if (!(of_a < 0.125 && of_m < 0.125)) return false;
   lengths.square_to_world = (1 - 0x1p-20) / ((1 + of_a) * (1 + of_m));
   // Eigenvalues of N N^T are from 1 - of_a to 1 + of_a; four roundings are spared.
@@ -89,8 +90,8 @@ TANDEM_HD inline bool bound_lengths(const double (&inverse)[3][3], double of_m, 
 TANDEM_HD inline bool bound_lengths(const Pose& pose_a, DistanceFrame& frame) {
   double inverse[3][3];
   relative_pose_detail::invert(pose_a.rotation, inverse);
-  return frame.error <= static_cast<float>(kLargestInFrame) &&
-         bound_lengths(inverse, distance::lack_of_orthonormality(frame.b_in_a.rotation), frame);
+  const double of_m = distance::lack_of_orthonormality(frame.b_in_a.rotation);
+  return bound_lengths(inverse, of_m, frame) && frame.error <= static_cast<float>(kLargestInFrame);
 }
 
 /// False: as of bound_lengths(). pose_a, pose_b: of stored coordinates.

@@ -124,6 +124,7 @@ constexpr Entry kEntries[] = {
     {kDeformed, "Deformed", "asset", "the question is not offered for deformed assets"},
     {kNotFloat32, "NotFloat32", "asset",
      "the question is not offered where positions are no float32 numbers"},
+    {kNoDirection, "NoDirection", "ray", "the direction of a ray is 0"},
     {kNoFinestLevel, "NoFinestLevel", nullptr,
      "a query by tolerance needs the finest level, and the asset was given without"},
     {kNoGpu, "NoGpu", nullptr, "there is no GPU that can be used"},

@@ -13,6 +13,8 @@ struct NearestSoFar;
 struct ManifoldLanes;
 struct RefitTree;
 struct RefitSurfaces;
+struct RayTask;
+struct PointTask;
 
 /// The functions that are compiled once for each width of vectors.
 struct LaneVariant {
@@ -22,6 +24,8 @@ struct LaneVariant {
   void (*nearest_phase)(const NearestTask&, const BoundedBlockPair*, std::uint32_t, NearestSoFar&);
   const ManifoldLanes* manifold_lanes;
   RefitSurfaces (*refit)(const RefitTree&, const float*);
+  void (*ray_walk)(RayTask&);
+  void (*point_walk)(PointTask&);
 };
 
 // Each is defined in a file of kernels/variants/, which is compiled for machines that have the instructions.

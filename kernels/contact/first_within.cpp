@@ -99,7 +99,7 @@ class FirstWithin {
   ContactCounters& counters_;
   ContactSink& sink_;
   Buffer<NearBlockPair>& waiting_;
-  DistanceFrame frame_;
+  DistanceFrame frame_ = {};
   distance::FrameClearance clearance_;
   float limit_ = 0;
   bool found_ = false, enough_memory_ = true;

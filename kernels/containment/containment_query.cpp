@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <tuple>
 
-#include "kernels/containment/component_labels.h"
+#include "kernels/common/component_labels.h"
 #include "kernels/containment/containment_rule.h"
 #include "kernels/scene/scene_state.h"
 

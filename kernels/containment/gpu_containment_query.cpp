@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
+#include "kernels/common/component_labels.h"
 #include "kernels/common/gpu_host.h"
-#include "kernels/containment/component_labels.h"
 #include "kernels/containment/containment_data.h"
 #include "kernels/containment/follow_records.h"
 #include "tandem/kernels/detail/buffer.h"

@@ -37,12 +37,16 @@
 /// +infinity. Nothing else overflows where frame_error() is finite: coordinates are below 2^33.
 namespace tandem {
 
-/// The pose of b in a's frame, and what lengths in that frame tell of the posed points' distances.
-struct DistanceFrame {
-  RelativePose b_in_a;
-  float error;                           ///< frame_error()
+/// What lengths in a body's frame tell of distances in the world.
+struct FrameLengths {
   double square_to_world;                ///< of a bound of boxes: 1 / (mu^2 nu^2), rounded down
-  double least_in_world, most_in_world;  ///< of a length in a's frame: at least so much, at most so much
+  double least_in_world, most_in_world;  ///< of a length in the frame: at least so much, at most so much
+};
+
+/// The pose of b in a's frame, and what lengths in that frame tell of the posed points' distances.
+struct DistanceFrame : FrameLengths {
+  RelativePose b_in_a;
+  float error;  ///< frame_error()
 };
 
 namespace distance {
@@ -67,19 +71,27 @@ TANDEM_HD inline double lack_of_orthonormality(const Real (&m)[3][3]) {
 
 }  // namespace distance
 
+/// Finds what lengths in a frame tell. inverse: of the rotation of the body whose frame it is; of_m:
+/// lack_of_orthonormality() of the other body's rotation in it, 0 where there is none. False: the rotations
+/// are far from orthonormal.
+TANDEM_HD inline bool bound_lengths(const double (&inverse)[3][3], double of_m, FrameLengths& lengths) {
+  const double of_a = distance::lack_of_orthonormality(inverse);
+  lengths = {};
+  if (!(of_a < 0.125 && of_m < 0.125)) return false;
+  lengths.square_to_world = (1 - 0x1p-20) / ((1 + of_a) * (1 + of_m));
+  // Eigenvalues of N N^T are from 1 - of_a to 1 + of_a; four roundings are spared.
+  lengths.least_in_world = (1 - 0x1p-50) / std::sqrt(1 + of_a);
+  lengths.most_in_world = (1 + 0x1p-50) / std::sqrt(1 - of_a);
+  return true;
+}
+
 /// Finds what lengths in a frame tell that has b_in_a and error. False: float32 cannot take the pair, and the
 /// frame is of no use.
 TANDEM_HD inline bool bound_lengths(const Pose& pose_a, DistanceFrame& frame) {
   double inverse[3][3];
   relative_pose_detail::invert(pose_a.rotation, inverse);
-  const double of_a = distance::lack_of_orthonormality(inverse),
-               of_m = distance::lack_of_orthonormality(frame.b_in_a.rotation);
-  if (!(frame.error <= static_cast<float>(kLargestInFrame) && of_a < 0.125 && of_m < 0.125)) return false;
-  frame.square_to_world = (1 - 0x1p-20) / ((1 + of_a) * (1 + of_m));
-  // Eigenvalues of N N^T are from 1 - of_a to 1 + of_a; four roundings are spared.
-  frame.least_in_world = (1 - 0x1p-50) / std::sqrt(1 + of_a);
-  frame.most_in_world = (1 + 0x1p-50) / std::sqrt(1 - of_a);
-  return true;
+  const double of_m = distance::lack_of_orthonormality(frame.b_in_a.rotation);
+  return bound_lengths(inverse, of_m, frame) && frame.error <= static_cast<float>(kLargestInFrame);
 }
 
 /// False: as of bound_lengths(). pose_a, pose_b: of stored coordinates.
@@ -118,13 +130,13 @@ TANDEM_HD inline Value box_bound(const RelativePose& b_in_a, const Value (&d)[3]
 }
 
 /// The least bound of boxes from which on whatever is in them is at least so far apart, in the world.
-TANDEM_HD inline float limit_of(const DistanceFrame& frame, double distance) {
+TANDEM_HD inline float limit_of(const FrameLengths& frame, double distance) {
   const double square = distance * distance / frame.square_to_world * (1 + 0x1p-22) + 2 * kSquareSpare;
   return square < 0x1p120 ? static_cast<float>(square) : INFINITY;
 }
 
 /// Returns how far apart, in the world, what is in boxes with this bound is at least.
-TANDEM_HD inline double distance_of(const DistanceFrame& frame, float bound) {
+TANDEM_HD inline double distance_of(const FrameLengths& frame, float bound) {
   const double square = static_cast<double>(bound) - kSquareSpare;
   return square > 0 ? std::sqrt(square * frame.square_to_world) * (1 - 0x1p-50) : 0;
 }

@@ -169,32 +169,42 @@ TANDEM_HD inline bool in_range(const double* p) {
   return all;
 }
 
+/// The vector from one point to another, exactly: the difference of two float64 numbers along each axis.
+struct Between {
+  const double* from;
+  const double* to;
+};
+
+TANDEM_HD inline bool in_range(const Between& u) {
+  return in_range(u.from) && in_range(u.to);
+}
+
 /// Assigns one of the three terms of a determinant: w[k] * (u[i] * v[j] - u[j] * v[i]) with (i, j, k) in
-/// cyclic order and u = q - p, v = r - p, w = s - p. 16 terms in the minor, 4 * 16 in the product.
-TANDEM_OUT_OF_LINE TANDEM_HD inline void assign_volume_term(const double* p, const double* q, const double* r,
-                                                            const double* s, int k, Expansion<64>& out) {
+/// cyclic order. 16 terms in the minor, 4 * 16 in the product.
+TANDEM_OUT_OF_LINE TANDEM_HD inline void assign_volume_term(const Between& u, const Between& v,
+                                                            const Between& w, int k, Expansion<64>& out) {
   const int i = (k + 1) % 3, j = (k + 2) % 3;
   Expansion<2> ui, uj, vi, vj, wk;
-  assign_difference(q[i], p[i], ui);
-  assign_difference(q[j], p[j], uj);
-  assign_difference(r[i], p[i], vi);
-  assign_difference(r[j], p[j], vj);
-  assign_difference(s[k], p[k], wk);
+  assign_difference(u.to[i], u.from[i], ui);
+  assign_difference(u.to[j], u.from[j], uj);
+  assign_difference(v.to[i], v.from[i], vi);
+  assign_difference(v.to[j], v.from[j], vj);
+  assign_difference(w.to[k], w.from[k], wk);
   Expansion<16> minor;
   assign_minor(ui, uj, vi, vj, minor);
   assign_product(minor, wk, out);
 }
 
-/// Sign of det(q - p, r - p, s - p) for points in range. 64 terms for each of three products, 128 for two of
-/// them; the last sum is not stored.
-TANDEM_OUT_OF_LINE TANDEM_HD inline int expansion_volume_sign(const double* p, const double* q,
-                                                              const double* r, const double* s) {
+/// Sign of det(u, v, w) for points in range. 64 terms for each of three products, 128 for two of them; the
+/// last sum is not stored.
+TANDEM_OUT_OF_LINE TANDEM_HD inline int expansion_volume_sign(const Between& u, const Between& v,
+                                                              const Between& w) {
   Expansion<128> two_terms;
   Expansion<64> x, y;
-  assign_volume_term(p, q, r, s, 0, x);
-  assign_volume_term(p, q, r, s, 1, y);
+  assign_volume_term(u, v, w, 0, x);
+  assign_volume_term(u, v, w, 1, y);
   assign_sum(x, y, two_terms);
-  assign_volume_term(p, q, r, s, 2, x);
+  assign_volume_term(u, v, w, 2, x);
   LastSign sum;
   assign_sum(two_terms, x, sum);
   return sum.sign();

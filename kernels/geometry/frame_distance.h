@@ -81,6 +81,27 @@ TANDEM_HD inline auto is_far_along(const Point<Value> (&corner_a)[3], const Poin
   return less(along.relative * largest + along.length, gap);
 }
 
+/// The interval that a guess tells. gap: how far a lies beyond b along nearest.along, as computed; largest: M
+/// of the proof; error: E.
+template <typename Value>
+TANDEM_HD inline FrameInterval<Value> interval_of(const Nearest<Value>& nearest, const Value& gap,
+                                                  const Value& largest, float error) {
+  constexpr float kU = 0x1p-24f;
+  const float off = 1.7321f * error * (1 + 8 * kU);
+  const Point<Value>& n = nearest.along;
+  const Value length = square_root(dot(n, n)), n_1 = frame::sum_of_magnitudes(n.x);
+  const Value sure = gap - (9.1f * kU) * (n_1 * largest);
+  const auto counts = less(value_of<Value>(0x1p-40), n_1) & less(Value{}, sure);
+  const Value quotient = sure / select(counts, length, value_of<Value>(1));
+  const Value lower = select(counts, (1 - 12 * kU) * quotient + (-off), Value{});
+  FrameInterval<Value> out;
+  out.along = n;
+  out.lower = select(less(Value{}, lower), lower, Value{});
+  const Point<Value>& apart = nearest.apart;
+  out.upper = (1 + 12 * kU) * square_root(dot(apart, apart)) + ((84 * kU) * largest + (off + 0x1p-60f));
+  return out;
+}
+
 /// a: corners as stored, b: posed() ones. error: frame_error().
 template <typename Value>
 TANDEM_HD inline FrameInterval<Value> frame_interval(const Point<Value> (&corner_a)[3],
@@ -93,22 +114,10 @@ TANDEM_HD inline FrameInterval<Value> frame_interval(const Point<Value> (&corner
     for (int k = 0; k < 3; ++k) largest = larger(largest, larger(magnitude(a[i].x[k]), magnitude(b[i].x[k])));
   }
   const Nearest<Value> nearest = nearest_features<Value>(a, b, value_of<Value>(0x1p-60));
-  constexpr float kU = 0x1p-24f;
-  const float off = 1.7321f * error * (1 + 8 * kU);
   const Point<Value>& n = nearest.along;
-  const Value length = square_root(dot(n, n)), n_1 = frame::sum_of_magnitudes(n.x);
   const Value gap = least_of(dot(n, a[0]), dot(n, a[1]), dot(n, a[2])) -
                     greatest_of(dot(n, b[0]), dot(n, b[1]), dot(n, b[2]));
-  const Value sure = gap - (9.1f * kU) * (n_1 * largest);
-  const auto counts = less(value_of<Value>(0x1p-40), n_1) & less(Value{}, sure);
-  const Value quotient = sure / select(counts, length, value_of<Value>(1));
-  const Value lower = select(counts, (1 - 12 * kU) * quotient + (-off), Value{});
-  FrameInterval<Value> out;
-  out.along = n;
-  out.lower = select(less(Value{}, lower), lower, Value{});
-  const Point<Value>& apart = nearest.apart;
-  out.upper = (1 + 12 * kU) * square_root(dot(apart, apart)) + ((84 * kU) * largest + (off + 0x1p-60f));
-  return out;
+  return interval_of(nearest, gap, largest, error);
 }
 
 /// The clearance that is asked of a pair of instances: a distance in the world, as lengths in a's frame.

@@ -32,8 +32,9 @@ TANDEM_HD inline bool ray_may_cross(const WorldBox& box, const double* p) {
   return box.hi[0] > p[0] && box.lo[1] <= p[1] && box.hi[1] > p[1] && box.lo[2] <= p[2] && box.hi[2] > p[2];
 }
 
-/// Returns whether the ray crosses the triangle. Finite coordinates.
-TANDEM_HD inline bool ray_crosses(const double (*t)[3], const double* p) {
+/// Returns how the ray crosses the triangle: 1 where it comes out at the front, from which the corners go
+/// round against the clock, -1 where it goes in there, 0 where it does not cross. Finite coordinates.
+TANDEM_HD inline int ray_crossing(const double (*t)[3], const double* p) {
   using detail::ExactSigns;
   bool within = false;
   int normal_x = 0;
@@ -45,7 +46,11 @@ TANDEM_HD inline bool ray_crosses(const double (*t)[3], const double* p) {
     within = !within;
     normal_x = upwards ? 1 : -1;
   }
-  return within && ExactSigns::volume(t[0], t[1], t[2], p) * normal_x < 0;
+  return within && ExactSigns::volume(t[0], t[1], t[2], p) * normal_x < 0 ? normal_x : 0;
+}
+
+TANDEM_HD inline bool ray_crosses(const double (*t)[3], const double* p) {
+  return ray_crossing(t, p) != 0;
 }
 
 /// The label of a triangle is the first triangle of its component; with this bit where that is open.

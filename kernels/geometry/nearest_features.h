@@ -122,18 +122,18 @@ TANDEM_HD inline void take_edges(const Edge<Value>& e, const Edge<Value>& f, con
   nearest.take(!less(square, Value{}), square, apart, apart, number, s, t);
 }
 
-/// A face's three corners and a corner each of three others; `sign` is 1 where the face is a's. The square is
-/// that of the two points, and not of the height, which means nothing where the face is a needle.
-template <typename Value>
-TANDEM_HD inline void take_face(const Point<Value> (&face)[3], const Point<Value> (&corner)[3], float sign,
-                                int number, const Value& least, Nearest<Value>& nearest) {
+/// A face's three corners and some corners of the other triangle; `sign` is 1 where the face is a's. The
+/// square is that of the two points, and not of the height, which means nothing where the face is a needle.
+template <int kCorners, typename Value>
+TANDEM_HD inline void take_face(const Point<Value> (&face)[3], const Point<Value> (&corner)[kCorners],
+                                float sign, int number, const Value& least, Nearest<Value>& nearest) {
   const Point<Value> u = minus(face[1], face[0]), v = minus(face[2], face[0]), normal = cross(u, v);
   const Value inverse_square = inverse(dot(normal, normal), least * least);
   const Point<Value> to_s = scaled(inverse_square, cross(v, normal)),
                      to_t = scaled(inverse_square, cross(normal, u));
   const Value zero{}, one = value_of<Value>(1);
   const auto has_normal = less(zero, inverse_square);
-  for (int i = 0; i < 3; ++i) {
+  for (int i = 0; i < kCorners; ++i) {
     const Point<Value> r = minus(corner[i], face[0]);
     const Value s = dot(r, to_s), t = dot(r, to_t), height = dot(r, normal);
     const Value part = height * inverse_square;
@@ -168,6 +168,27 @@ TANDEM_HD inline Nearest<Value> nearest_features(const Point<Value> (&a)[3], con
   }
   take_face(a, b, 1, 9, least, nearest);
   take_face(b, a, -1, 12, least, nearest);
+  return nearest;
+}
+
+/// The point of a triangle that is nearest to the origin, as that of two triangles the second of which is the
+/// origin three times. The first point, not the second, tells s. least: as above.
+template <typename Value>
+TANDEM_HD inline Nearest<Value> nearest_to_origin(const Point<Value> (&a)[3], const Value& least) {
+  const Value zero{};
+  Nearest<Value> nearest;
+  nearest.apart = nearest.along = a[0];
+  nearest.square = dot(a[0], a[0]);
+  nearest.feature = nearest.s = nearest.t = zero;
+  for (int i = 0; i < 3; ++i) {
+    const Point<Value> along = minus(a[(i + 1) % 3], a[i]);
+    const Value s = clamped_to_1((zero - dot(along, a[i])) * inverse(dot(along, along), least));
+    const Point<Value> apart = plus(a[i], scaled(s, along));
+    const Value square = dot(apart, apart);
+    nearest.take(!less(square, zero), square, apart, apart, 3 * i, s, zero);
+  }
+  const Point<Value> origin[1] = {{{zero, zero, zero}}};
+  take_face(a, origin, 1, 9, least, nearest);
   return nearest;
 }
 

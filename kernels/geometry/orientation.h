@@ -118,13 +118,12 @@ TANDEM_HD inline Real area(const double* p, const double* q, const double* r, in
   return ui * vj - uj * vi;
 }
 
-/// Returns whether each product of volume(p, q, r, s) has a factor that is exactly zero, as where four points
-/// have one coordinate in common. float64 numbers differ exactly when their difference as computed is not
-/// zero.
-TANDEM_HD inline bool vanishes(const double* p, const double* q, const double* r, const double* s) {
-  const bool u0 = q[0] != p[0], u1 = q[1] != p[1], u2 = q[2] != p[2];
-  const bool v0 = r[0] != p[0], v1 = r[1] != p[1], v2 = r[2] != p[2];
-  const bool w0 = s[0] != p[0], w1 = s[1] != p[1], w2 = s[2] != p[2];
+/// Returns whether each product of det(u, v, w) has a factor that is exactly zero, as where four points have
+/// one coordinate in common. float64 numbers differ exactly when their difference as computed is not zero.
+TANDEM_HD inline bool vanishes(const Between& u, const Between& v, const Between& w) {
+  const bool u0 = u.to[0] != u.from[0], u1 = u.to[1] != u.from[1], u2 = u.to[2] != u.from[2];
+  const bool v0 = v.to[0] != v.from[0], v1 = v.to[1] != v.from[1], v2 = v.to[2] != v.from[2];
+  const bool w0 = w.to[0] != w.from[0], w1 = w.to[1] != w.from[1], w2 = w.to[2] != w.from[2];
   return !((w0 && ((u1 && v2) || (u2 && v1))) || (w1 && ((u2 && v0) || (u0 && v2))) ||
            (w2 && ((u0 && v1) || (u1 && v0))));
 }
@@ -134,7 +133,7 @@ TANDEM_HD inline bool vanishes(const double* p, const double* q, const double* r
 struct ExactSigns {
   TANDEM_HD static int volume(const double* p, const double* q, const double* r, const double* s) {
     const int sign = Plane<double>(p, q, r).side(s);
-    return sign != 0 ? sign : volume_without_bound(p, q, r, s);
+    return sign != 0 ? sign : volume_without_bound({p, q}, {p, r}, {p, s});
   }
 
   TANDEM_HD static int area(const double* p, const double* q, const double* r, int k) {
@@ -144,11 +143,11 @@ struct ExactSigns {
     return sign != 0 ? sign : area_without_bound(p, q, r, k);
   }
 
-  TANDEM_OUT_OF_LINE TANDEM_HD static int volume_without_bound(const double* p, const double* q,
-                                                               const double* r, const double* s) {
-    if (vanishes(p, q, r, s)) return 0;
-    if (in_range(p) && in_range(q) && in_range(r) && in_range(s)) return expansion_volume_sign(p, q, r, s);
-    return wide_volume_sign(p, q, r, s);
+  TANDEM_OUT_OF_LINE TANDEM_HD static int volume_without_bound(const Between& u, const Between& v,
+                                                               const Between& w) {
+    if (vanishes(u, v, w)) return 0;
+    if (in_range(u) && in_range(v) && in_range(w)) return expansion_volume_sign(u, v, w);
+    return wide_volume_sign(u, v, w);
   }
 
   TANDEM_OUT_OF_LINE TANDEM_HD static int area_without_bound(const double* p, const double* q,

@@ -148,15 +148,21 @@ TANDEM_HD inline Point<double> refined(const LocalPair& pair, const Nearest<doub
 
 /// Returns the interval that float64 knows: it is always right, and the narrower the farther the triangles
 /// are apart for their size.
-TANDEM_HD inline DistanceInterval bounded_distance(const LocalPair& pair, const DistanceTolerance& tolerance,
+/// nearest: a guess.
+TANDEM_HD inline DistanceInterval bounded_distance(const LocalPair& pair, const Nearest<double>& nearest,
+                                                   const DistanceTolerance& tolerance,
                                                    TriangleWeights& weights) {
-  const Nearest<double> nearest = nearest_features<double>(pair.a, pair.b, 0x1p-480);
   weights = weights_of(nearest);
   DistanceInterval interval = {distance_along(pair, nearest.along), distance_at(pair, weights)};
   if (is_narrow(interval, tolerance)) return interval;
   const double lower = distance_along(pair, refined(pair, nearest));
   if (lower > interval.lower) interval.lower = lower;
   return interval;
+}
+
+TANDEM_HD inline DistanceInterval bounded_distance(const LocalPair& pair, const DistanceTolerance& tolerance,
+                                                   TriangleWeights& weights) {
+  return bounded_distance(pair, nearest_features<double>(pair.a, pair.b, 0x1p-480), tolerance, weights);
 }
 
 /// Finds where edge i of a triangle goes through the plane of a face, as weights of both. False: it does not
@@ -257,6 +263,25 @@ TANDEM_HD inline TriangleDistance triangle_distance(const TrianglePair& t,
   TriangleDistance out;
   find_distance<detail::kMaxWords>(t, tolerance, out);
   return out;
+}
+
+/// The distance of a triangle, t.a, from a point, three times in t.b. As triangle_distance(), but with a
+/// guess that takes less time.
+TANDEM_HD inline TriangleDistance point_distance(const TrianglePair& t, const DistanceTolerance& tolerance) {
+  const distance::LocalPair local = distance::local_pair(t);
+  if (local.in_range()) {
+    distance::Point<double> from_point[3];
+    for (int i = 0; i < 3; ++i) from_point[i] = distance::minus(local.a[i], local.b[0]);
+    const auto nearest = distance::nearest_to_origin<double>(from_point, 0x1p-480);
+    TriangleDistance out;
+    TriangleWeights weights = {};
+    out.interval = distance::bounded_distance(local, nearest, tolerance, weights);
+    if (out.interval.lower != 0 && is_narrow(out.interval, tolerance)) {
+      distance::write_points(t, weights, out);
+      return out;
+    }
+  }
+  return triangle_distance(t, tolerance);
 }
 
 }  // namespace tandem

@@ -129,15 +129,17 @@ TANDEM_HD inline int sign_of(const std::uint32_t* word, int n) {
   return 0;
 }
 
-/// Sign of det(q - p, r - p, s - p): six products of three differences.
-TANDEM_OUT_OF_LINE TANDEM_HD inline int wide_volume_sign(const double* p, const double* q, const double* r,
-                                                         const double* s) {
+/// Sign of det(u, v, w): six products of three differences.
+TANDEM_OUT_OF_LINE TANDEM_HD inline int wide_volume_sign(const Between& u, const Between& v,
+                                                         const Between& w) {
   ExponentRange range;
   for (int k = 0; k < 3; ++k) {
-    range.include(p[k]);
-    range.include(q[k]);
-    range.include(r[k]);
-    range.include(s[k]);
+    range.include(u.from[k]);
+    range.include(u.to[k]);
+    range.include(v.from[k]);
+    range.include(v.to[k]);
+    range.include(w.from[k]);
+    range.include(w.to[k]);
   }
   const int n = range.words(), unit = range.unit;
   Wide<kMaxWords> x, y;
@@ -147,10 +149,10 @@ TANDEM_OUT_OF_LINE TANDEM_HD inline int wide_volume_sign(const double* p, const 
   for (int term = 0; term < 6; ++term) {
     const bool odd = term >= 3;
     const int k = term % 3, i = (k + (odd ? 2 : 1)) % 3, j = (k + (odd ? 1 : 2)) % 3;
-    assign_difference(q[i], p[i], unit, n, x);
-    assign_difference(r[j], p[j], unit, n, y);
+    assign_difference(u.to[i], u.from[i], unit, n, x);
+    assign_difference(v.to[j], v.from[j], unit, n, y);
     assign_product(x, n, y, n, xy);
-    assign_difference(s[k], p[k], unit, n, x);
+    assign_difference(w.to[k], w.from[k], unit, n, x);
     assign_product(xy, 2 * n, x, n, xyz);
     accumulate(sum, 3 * n, xyz.word, 3 * n, 0, xyz.negative != odd);
   }

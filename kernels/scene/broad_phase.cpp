@@ -49,7 +49,7 @@ std::uint32_t motions_that_meet(Motion one) {
 
 }  // namespace
 
-bool BroadPhase::Tree::reserve(std::size_t boxes, const PairFilter& filter) {
+bool BoxTree::reserve(std::size_t boxes, const PairFilter& filter) {
   std::size_t total = 0;
   levels = 0;
   for (std::size_t below = boxes; levels == 0 || below > 1; below = groups_over(below)) {
@@ -67,12 +67,12 @@ BroadPhase::Kind BroadPhase::kind_of(const PairFilter& filter, std::size_t box) 
 }
 
 // Of boxes of one world.
-bool BroadPhase::Kind::before(const Kind& other) const {
+bool BoxTree::Kind::before(const Kind& other) const {
   const auto order = [](const Kind& k) { return std::tie(k.group, k.mask, k.motions, k.met); };
   return order(*this) < order(other);
 }
 
-void BroadPhase::Kind::add(const Kind& more) {
+void BoxTree::Kind::add(const Kind& more) {
   group |= more.group;
   mask |= more.mask;
   motions |= more.motions;
@@ -80,7 +80,7 @@ void BroadPhase::Kind::add(const Kind& more) {
   worlds.add(more.worlds);
 }
 
-bool BroadPhase::Kind::may_look_at(const Kind& other) const {
+bool BoxTree::Kind::may_look_at(const Kind& other) const {
   return (met & other.motions) != 0 && groups_meet(group, mask, other.group, other.mask) &&
          worlds.meets(other.worlds);
 }
@@ -462,6 +462,16 @@ Status BroadPhase::keep_fixed(std::span<const WorldBox> boxes, std::span<const M
   if (fixed == 0) return Status::kOk;
   build(boxes, kinds, kept_, team);
   kept_of_ = boxes.size();
+  return Status::kOk;
+}
+
+Status BroadPhase::make_tree(std::span<const WorldBox> boxes, WorkerThreads& threads, std::uint32_t workers) {
+  const Team team = {threads, workers};
+  pairs_.clear();
+  if (boxes.size() >= kNoIndex) return Status::kTooManyInstances;
+  if (!tree_.reserve(boxes.size(), {})) return Status::kOutOfMemory;
+  if (!take(boxes, nullptr, nullptr, tree_, team)) return Status::kOutOfRange;
+  if (!boxes.empty()) build(boxes, {}, tree_, team);
   return Status::kOk;
 }
 

@@ -5,6 +5,7 @@
 #include "kernels/manifold/patch_passes_lanes.h"
 #include "kernels/manifold/patch_walk_lanes.h"
 #include "kernels/manifold/piece_lanes.h"
+#include "kernels/points_and_rays/probe_lanes.h"
 #include "kernels/refit/refit_lanes.h"
 
 #ifdef TANDEM_HAVE_LANES
@@ -37,7 +38,9 @@ constexpr LaneVariant kLaneVariantOf = {block_pair_mask_of_lanes<kCount>,
                                         narrow_phase_of_lanes<kCount, true>,
                                         nearest_phase_of_lanes<kCount>,
                                         &kManifoldLanes,
-                                        refit_of_lanes<kCount>};
+                                        refit_of_lanes<kCount>,
+                                        ray_walk_by<Lanes4>,
+                                        point_walk_by<Lanes4>};
 
 }  // namespace
 }  // namespace tandem

@@ -3,7 +3,7 @@ import re
 from dataclasses import dataclass
 
 # {type of a field in C: its bytes}; pointers have 8.
-BYTES = {"uint8_t": 1, "uint32_t": 4, "tandem_status": 4, "float": 4, "uint64_t": 8, "int": 4, "double": 8, "size_t": 8}
+BYTES = {"uint8_t": 1, "uint32_t": 4, "int32_t": 4, "tandem_status": 4, "float": 4, "uint64_t": 8, "int": 4, "double": 8, "size_t": 8}
 
 _COMMENT = re.compile(r"//.*")
 _DOC = r"((?:^///[^\n]*\n)*)"

@@ -18,7 +18,7 @@ HEADER = ROOT / "bindings/c/include/tandem/tandem.h"
 CUDA_LIBRARY, CUDA_HEADER = os.environ.get("TANDEM_CUDA_LIBRARY"), ROOT / "bindings/c/cuda/include/tandem/tandem_cuda.h"
 DECLARATIONS = ROOT / "bindings/c/declarations"
 PAGE = (ROOT / "docs/c.md").read_text(encoding="utf-8")
-BYTES_IN_CSHARP = {"byte": 1, "uint": 4, "float": 4, "ulong": 8, "double": 8, "IntPtr": 8, "UIntPtr": 8}
+BYTES_IN_CSHARP = {"byte": 1, "uint": 4, "int": 4, "float": 4, "ulong": 8, "double": 8, "IntPtr": 8, "UIntPtr": 8}
 
 
 def csharp_structs():

@@ -142,7 +142,7 @@ static void test_filters(void) {
   uint8_t* gpu_motion = (uint8_t*)to_gpu(motion, sizeof motion);
   uint32_t *gpu_group = (uint32_t*)to_gpu(group, sizeof group),
            *gpu_mask = (uint32_t*)to_gpu(mask, sizeof mask);
-  tandem_gpu_pair_filter filter = {sizeof filter, 0, gpu_motion, gpu_group, gpu_mask, excluded};
+  tandem_gpu_pair_filter filter = {sizeof filter, 0, gpu_motion, gpu_group, gpu_mask, NULL, excluded};
   tandem_gpu_broad_phase_options near = sorted_pairs();
   near.filter = &filter;
   CHECK_STATUS(tandem_scene_place(expected, bodies, kBodies, &cpu_filter), TANDEM_OK);

@@ -280,8 +280,14 @@ static void test_allocators(const char* folder) {
   const tandem_motion still[3] = {{{0}, {0}, {0}}, {{0}, {0}, {0}}, {{0}, {0}, {0}}};
   const tandem_impact_options impacts = {sizeof impacts, 0, 1, 0, still, 3, NULL, 0};
   const tandem_tolerance_options verdicts = {sizeof verdicts, 0, 0, NULL, 0};
-  const tandem_questions all = {sizeof all, 1,        &pairs,    &contacts, &manifolds,
-                                &distances, &impacts, &verdicts, NULL};
+  const double place[3] = {2, 0, 0}, along[3] = {-1, 0, 0};
+  const tandem_closest_options closest = {sizeof closest, 0, 1, 0, 0, 0, 0, place, 1};
+  const tandem_ray_options rays = {sizeof rays, TANDEM_ALL_HITS, 0, 0, 0, place, along, 1};
+  const uint32_t moving[1] = {1};
+  const tandem_pose there = {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, {0.5, 0, 0}};
+  const tandem_configuration_options configurations = {sizeof configurations, 1, moving, 1, &there, 1, 0};
+  const tandem_questions all = {sizeof all, 1,         &pairs, &contacts,       &manifolds, &distances,
+                                &impacts,   &verdicts, NULL,   &configurations, &closest,   &rays};
   int succeeded = 0, refused = 0;
   for (int granted = 0; granted < 300 && succeeded == 0; ++granted) {
     grants_left = granted;

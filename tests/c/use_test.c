@@ -272,6 +272,15 @@ static void test_rows_and_calls(const tandem_allocator* allocator) {
   CHECK(contact_count(scene) == 52);
   const tandem_body_at* there = tandem_scene_bodies_at(scene, &count);
   CHECK(count == 2 && there[0].body == 0 && there[1].point == 0 && there[1].body == 1);
+  const double along[] = {0, 0, 1, 1, 0, 0};
+  const tandem_closest_options closest = {sizeof closest, 0, 1, 0, 0, 0, 0, points, 2};
+  const tandem_ray_options rays = {sizeof rays, TANDEM_FIRST_HIT, 0, 0, 0, points, along, 2};
+  const tandem_questions probes = {.struct_size = sizeof probes, .closest = &closest, .rays = &rays};
+  CHECK_STATUS(tandem_scene_find(scene, &probes), TANDEM_OK);
+  const tandem_closest_point* nearest = tandem_scene_closest(scene, &count);
+  CHECK(count == 2 && nearest[0].upper == 0 && nearest[0].body <= 1 && nearest[1].lower > 50);
+  const tandem_ray_hit* hits = tandem_scene_rays(scene, &count);
+  CHECK(count == 2 && hits[0].t == 0 && hits[0].body == 0 && hits[1].body == TANDEM_NO_INDEX);
   options.pairs = NULL;
   options.pair_count = 0;
   questions.contained = 1;

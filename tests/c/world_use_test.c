@@ -88,7 +88,7 @@ static void test_options_start_and_filter(void) {
   const tandem_object_pair pair = {1, 0};
   tandem_excluded_pairs* excluded = NULL;
   CHECK_STATUS(tandem_excluded_pairs_create(&pair, 1, NULL, &excluded), TANDEM_OK);
-  tandem_pair_filter filter = {sizeof filter, 0, 2, motion, NULL, NULL, excluded};
+  tandem_pair_filter filter = {sizeof filter, 0, 2, motion, NULL, NULL, NULL, excluded};
   start = (tandem_body_start){.struct_size = sizeof start, .count = 2, .velocity = speeds};
   CHECK_STATUS(tandem_world_set_bodies(world, bodies, 2, &filter, &start), TANDEM_OK);
   CHECK_STATUS(tandem_world_step(world, 0.01, 50), TANDEM_OK);

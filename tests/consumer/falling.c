@@ -8,7 +8,7 @@ int main(int argc, char** argv) {
   const tandem_instance bodies[2] = {{0, 0, {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, {0, 0, 0}}},
                                      {0, 0, {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, {0.2, 0, 2}}}};
   const uint8_t motion[2] = {TANDEM_FIXED, TANDEM_MOVING};
-  const tandem_pair_filter filter = {sizeof filter, 0, 2, motion, NULL, NULL, NULL};
+  const tandem_pair_filter filter = {sizeof filter, 0, 2, motion, NULL, NULL, NULL, NULL};
   tandem_status status = tandem_asset_open(argc > 1 ? argv[1] : "", NULL, NULL, &box, NULL);
   if (status == TANDEM_OK) status = tandem_world_create(NULL, NULL, &world);
   if (status == TANDEM_OK) status = tandem_world_set_assets(world, &box, 1);

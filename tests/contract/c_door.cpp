@@ -201,10 +201,37 @@ class CDoor final : public Door {
       const Outcome outcome = told(tandem_scene_find_bodies_at(scene_, &chosen));
       return {outcome, {}, objects_of(rows_of(tandem_scene_bodies_at, scene_)), {}, {}};
     }
+    if (question == "closest") return closest(options);
+    if (question == "rays") return rays(options);
     return {{"no question " + question}, {}, {}, {}, {}};
   }
 
  private:
+  Found closest(const Json& options) {
+    auto chosen = sized<tandem_closest_options>();
+    const std::vector<std::array<double, 3>> points = points_of(options);
+    chosen.points = points.empty() ? nullptr : points[0].data();
+    chosen.point_count = points.size();
+    chosen.sides = flag(options, "sides");
+    chosen.limit_reach = options.contains("reach");
+    chosen.reach = number(options, "reach", 0);
+    const Outcome outcome = told(tandem_scene_find_closest(scene_, &chosen));
+    return {outcome, {}, objects_of(rows_of(tandem_scene_closest, scene_)), {}, {}};
+  }
+
+  Found rays(const Json& options) {
+    auto chosen = sized<tandem_ray_options>();
+    const auto origins = points_of(options, "origins"), directions = points_of(options, "directions");
+    chosen.origins = origins.empty() ? nullptr : origins[0].data();
+    chosen.directions = directions.empty() ? nullptr : directions[0].data();
+    chosen.ray_count = origins.size();
+    chosen.hits = hits_of(options);
+    chosen.limit_reach = options.contains("reach");
+    chosen.reach = number(options, "reach", 0);
+    const Outcome outcome = told(tandem_scene_find_rays(scene_, &chosen));
+    return {outcome, {}, objects_of(rows_of(tandem_scene_rays, scene_)), {}, {}};
+  }
+
   Outcome told(tandem_status status) const {
     return {tandem_status_name(status), tandem_scene_where(scene_)};
   }

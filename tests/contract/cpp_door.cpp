@@ -1,10 +1,12 @@
 #include "contract/door.h"
 #include "tandem/kernels/bodies_at_query.h"
+#include "tandem/kernels/closest_query.h"
 #include "tandem/kernels/containment_query.h"
 #include "tandem/kernels/distance_query.h"
 #include "tandem/kernels/excluded_pairs.h"
 #include "tandem/kernels/impact_query.h"
 #include "tandem/kernels/manifold_query.h"
+#include "tandem/kernels/ray_query.h"
 #include "tandem/kernels/tolerance_query.h"
 #include "tandem/runtime/map.h"
 
@@ -84,10 +86,26 @@ class CppDoor final : public Door {
     if (question == "verdicts") return about_pairs(verdicts_, options, {number(options, "tolerance", 0)});
     if (question == "bodies_at")
       return shown(bodies_at_, bodies_at_.find(*scene_, {.points = points_of(options)}));
+    if (question == "closest") return closest(options);
+    if (question == "rays") return rays(options);
     return {{"no question " + question}, {}, {}, {}, {}};
   }
 
  private:
+  Found closest(const Json& options) {
+    const std::vector<std::array<double, 3>> points = points_of(options);
+    ClosestOptions chosen = {.points = points, .sides = flag(options, "sides")};
+    chosen.reach = number(options, "reach", chosen.reach);
+    return shown(closest_, closest_.find(*scene_, chosen));
+  }
+
+  Found rays(const Json& options) {
+    const auto origins = points_of(options, "origins"), directions = points_of(options, "directions");
+    RayOptions chosen = {.origins = origins, .directions = directions, .hits = RayHits{hits_of(options)}};
+    chosen.reach = number(options, "reach", chosen.reach);
+    return shown(rays_, rays_.find(*scene_, chosen));
+  }
+
   Outcome told(Status status) const { return {name(status), status == Status::kOk ? 0 : scene_->where()}; }
 
   template <typename Query>
@@ -158,6 +176,8 @@ class CppDoor final : public Door {
   ImpactQuery impacts_;
   ToleranceQuery verdicts_;
   BodiesAtQuery bodies_at_;
+  ClosestQuery closest_;
+  RayQuery rays_;
 };
 
 }  // namespace

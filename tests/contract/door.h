@@ -82,11 +82,17 @@ inline std::vector<ObjectPair> pairs_of(const Json& list) {
   return pairs;
 }
 
-inline std::vector<std::array<double, 3>> points_of(const Json& options) {
+inline std::vector<std::array<double, 3>> points_of(const Json& options, const char* name = "points") {
   std::vector<std::array<double, 3>> points;
-  for (const Json& point : options["points"])
+  for (const Json& point : options[name])
     points.push_back({number(point[0]), number(point[1]), number(point[2])});
   return points;
+}
+
+/// The number that means a choice of `hits` of the table.
+inline std::uint32_t hits_of(const Json& options) {
+  const std::string hits = options.value("hits", "first");
+  return hits == "first" ? 0 : hits == "any" ? 1 : 2;
 }
 
 /// Motions of the table: rows of a velocity and, where they have nine numbers, an angular velocity and a
@@ -128,9 +134,10 @@ Json object_of(const Row& row) {
   TANDEM_FIELD(contacts) TANDEM_FIELD(manifolds) TANDEM_FIELD(points) TANDEM_FIELD(open_curves)
   TANDEM_FIELD(ambiguous_touches) TANDEM_FIELD(inside) TANDEM_FIELD(outer_open) TANDEM_FIELD(touching)
   TANDEM_FIELD(at_start) TANDEM_FIELD(found) TANDEM_FIELD(apart) TANDEM_FIELD(within_tolerance)
+  TANDEM_FIELD(t) TANDEM_FIELD(ray) TANDEM_FIELD(within) TANDEM_FIELD(winding)
   // clang-format on
 #undef TANDEM_FIELD
-                                                              return object;
+                                                                      return object;
 }
 
 template <typename Rows>

@@ -13,7 +13,7 @@ from scene_table import SCENES, bodies_of, expect_rows, hash_of, motions_of, opt
 
 MESHES = Path(os.environ["TANDEM_CONTRACT_MESHES"])
 ON_DEVICE = {"device": os.environ["TANDEM_DEVICE"]} if "TANDEM_DEVICE" in os.environ else {}
-OPTIONS = ("pairs", "reach", "mode", "first_contact_only", "self_pairs", "within", "add_error_bounds", "leave_out_rings", "most_points", "match_previous", "keep", "absolute_tolerance",
+OPTIONS = ("pairs", "reach", "mode", "first_contact_only", "self_pairs", "sides", "within", "add_error_bounds", "leave_out_rings", "most_points", "match_previous", "keep", "absolute_tolerance",
            "relative_tolerance", "tolerance", "duration")
 # The package says these by ValueError, because it checks arguments itself.
 REFUSED_AS_ARGUMENT = {"OutOfRange", "BadMotion", "BadOption", "BadReach", "BadTolerance", "BadDuration", "MotionMismatch"}
@@ -49,8 +49,11 @@ class Door:
             options["motion"] = motions_of(step["motion"], len(scene.instances)).view(tandem.MOTION)[:, 0]
         if "former" in step:
             options["former"] = self.former()
-        if "points" in step:
-            options["points"] = np.array(step["points"], np.float64).reshape(-1, 3)
+        for name in ("points", "origins", "directions"):
+            if name in step:
+                options[name] = np.array(step[name], np.float64).reshape(-1, 3)
+        if "hits" in step:
+            options["hits"] = step["hits"]
         found = self.found[step["ask"]] = getattr(scene, step["ask"])(**options)
         return found
 
@@ -70,7 +73,7 @@ def columns_of(rows):
 def expect_found(question, found, expected):
     if question == "pairs":
         pairs = rows = found
-    elif question == "bodies_at":
+    elif question in ("bodies_at", "closest", "rays"):
         pairs, rows = np.zeros(0), found
     else:
         pairs, rows = found.pairs, getattr(found, question)

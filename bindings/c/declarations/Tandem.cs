@@ -437,6 +437,69 @@ public unsafe struct tandem_configuration_counters {
 }
 
 [StructLayout(LayoutKind.Sequential)]
+public unsafe struct tandem_closest_options {
+  public uint struct_size;
+  public uint limit_reach;
+  public uint sides;
+  public uint reserved;
+  public double reach;
+  public double absolute_tolerance;
+  public double relative_tolerance;
+  public double* points;
+  public UIntPtr point_count;
+}
+
+[StructLayout(LayoutKind.Sequential)]
+public unsafe struct tandem_closest_point {
+  public double lower;
+  public double upper;
+  public fixed double position[3];
+  public uint body;
+  public uint triangle;
+  public uint face;
+  public uint within;
+  public int winding;
+  public uint reserved;
+}
+
+[StructLayout(LayoutKind.Sequential)]
+public unsafe struct tandem_closest_counters {
+  public ulong points;
+  public ulong blocks;
+  public ulong by_float64;
+}
+
+[StructLayout(LayoutKind.Sequential)]
+public unsafe struct tandem_ray_options {
+  public uint struct_size;
+  public uint hits;
+  public uint limit_reach;
+  public uint reserved;
+  public double reach;
+  public double* origins;
+  public double* directions;
+  public UIntPtr ray_count;
+}
+
+[StructLayout(LayoutKind.Sequential)]
+public unsafe struct tandem_ray_hit {
+  public double t;
+  public fixed double weight[2];
+  public uint ray;
+  public uint body;
+  public uint triangle;
+  public uint face;
+}
+
+[StructLayout(LayoutKind.Sequential)]
+public unsafe struct tandem_ray_counters {
+  public ulong rays;
+  public ulong hits;
+  public ulong blocks;
+  public ulong by_float64;
+}
+
+[StructLayout(LayoutKind.Sequential)]
 public unsafe struct tandem_questions {
   public uint struct_size;
   public uint contained;
@@ -448,6 +511,8 @@ public unsafe struct tandem_questions {
   public tandem_tolerance_options* verdicts;
   public tandem_bodies_at_options* bodies_at;
   public tandem_configuration_options* configurations;
+  public tandem_closest_options* closest;
+  public tandem_ray_options* rays;
 }
 
 [StructLayout(LayoutKind.Sequential)]
@@ -462,6 +527,8 @@ public unsafe struct tandem_counters {
   public tandem_tolerance_counters verdicts;
   public tandem_moved_counters moved;
   public tandem_configuration_counters configurations;
+  public tandem_closest_counters closest;
+  public tandem_ray_counters rays;
 }
 
 [StructLayout(LayoutKind.Sequential)]
@@ -655,6 +722,7 @@ public static unsafe class Native {
   public const uint TANDEM_VERTEX_COUNT_MISMATCH = 221;
   public const uint TANDEM_DEFORMED = 222;
   public const uint TANDEM_NOT_FLOAT32 = 223;
+  public const uint TANDEM_NO_DIRECTION = 224;
   public const uint TANDEM_NO_GPU = 300;
   public const uint TANDEM_DRIVER_TOO_OLD = 301;
   public const uint TANDEM_GPU_NOT_SUPPORTED = 302;
@@ -692,6 +760,9 @@ public static unsafe class Native {
   public const uint TANDEM_APART = 0;
   public const uint TANDEM_TOUCH = 1;
   public const uint TANDEM_WITHIN_TOLERANCE = 2;
+  public const uint TANDEM_FIRST_HIT = 0;
+  public const uint TANDEM_ANY_HIT = 1;
+  public const uint TANDEM_ALL_HITS = 2;
   public const uint TANDEM_BALL = 0;
   public const uint TANDEM_HINGE = 1;
   public const uint TANDEM_SLIDER = 2;
@@ -758,6 +829,10 @@ public static unsafe class Native {
   [DllImport("tandem")] public static extern tandem_body_at* tandem_scene_bodies_at(IntPtr scene, UIntPtr* count);
   [DllImport("tandem")] public static extern uint tandem_scene_find_configurations(IntPtr scene, tandem_configuration_options* options);
   [DllImport("tandem")] public static extern tandem_configuration_pair* tandem_scene_configurations(IntPtr scene, UIntPtr* count);
+  [DllImport("tandem")] public static extern uint tandem_scene_find_closest(IntPtr scene, tandem_closest_options* options);
+  [DllImport("tandem")] public static extern tandem_closest_point* tandem_scene_closest(IntPtr scene, UIntPtr* count);
+  [DllImport("tandem")] public static extern uint tandem_scene_find_rays(IntPtr scene, tandem_ray_options* options);
+  [DllImport("tandem")] public static extern tandem_ray_hit* tandem_scene_rays(IntPtr scene, UIntPtr* count);
   [DllImport("tandem")] public static extern uint tandem_scene_find(IntPtr scene, tandem_questions* questions);
   [DllImport("tandem")] public static extern uint tandem_scene_get_counters(IntPtr scene, tandem_counters* counters);
   [DllImport("tandem")] public static extern uint tandem_world_create(tandem_world_options* options, tandem_allocator* allocator, IntPtr* world);

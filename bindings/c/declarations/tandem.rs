@@ -99,6 +99,7 @@ pub const TANDEM_NO_SOURCE_VERTICES: u32 = 220;
 pub const TANDEM_VERTEX_COUNT_MISMATCH: u32 = 221;
 pub const TANDEM_DEFORMED: u32 = 222;
 pub const TANDEM_NOT_FLOAT32: u32 = 223;
+pub const TANDEM_NO_DIRECTION: u32 = 224;
 pub const TANDEM_NO_GPU: u32 = 300;
 pub const TANDEM_DRIVER_TOO_OLD: u32 = 301;
 pub const TANDEM_GPU_NOT_SUPPORTED: u32 = 302;
@@ -136,6 +137,9 @@ pub const TANDEM_IMPACT_AT_START: u32 = 2;
 pub const TANDEM_APART: u32 = 0;
 pub const TANDEM_TOUCH: u32 = 1;
 pub const TANDEM_WITHIN_TOLERANCE: u32 = 2;
+pub const TANDEM_FIRST_HIT: u32 = 0;
+pub const TANDEM_ANY_HIT: u32 = 1;
+pub const TANDEM_ALL_HITS: u32 = 2;
 pub const TANDEM_BALL: u32 = 0;
 pub const TANDEM_HINGE: u32 = 1;
 pub const TANDEM_SLIDER: u32 = 2;
@@ -654,6 +658,75 @@ pub struct tandem_configuration_counters {
 
 #[repr(C)]
 #[derive(Clone, Copy)]
+pub struct tandem_closest_options {
+    pub struct_size: u32,
+    pub limit_reach: u32,
+    pub sides: u32,
+    pub reserved: u32,
+    pub reach: f64,
+    pub absolute_tolerance: f64,
+    pub relative_tolerance: f64,
+    pub points: *const f64,
+    pub point_count: usize,
+}
+
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct tandem_closest_point {
+    pub lower: f64,
+    pub upper: f64,
+    pub position: [f64; 3],
+    pub body: u32,
+    pub triangle: u32,
+    pub face: u32,
+    pub within: u32,
+    pub winding: i32,
+    pub reserved: u32,
+}
+
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct tandem_closest_counters {
+    pub points: u64,
+    pub blocks: u64,
+    pub by_float64: u64,
+}
+
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct tandem_ray_options {
+    pub struct_size: u32,
+    pub hits: u32,
+    pub limit_reach: u32,
+    pub reserved: u32,
+    pub reach: f64,
+    pub origins: *const f64,
+    pub directions: *const f64,
+    pub ray_count: usize,
+}
+
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct tandem_ray_hit {
+    pub t: f64,
+    pub weight: [f64; 2],
+    pub ray: u32,
+    pub body: u32,
+    pub triangle: u32,
+    pub face: u32,
+}
+
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct tandem_ray_counters {
+    pub rays: u64,
+    pub hits: u64,
+    pub blocks: u64,
+    pub by_float64: u64,
+}
+
+#[repr(C)]
+#[derive(Clone, Copy)]
 pub struct tandem_questions {
     pub struct_size: u32,
     pub contained: u32,
@@ -665,6 +738,8 @@ pub struct tandem_questions {
     pub verdicts: *const tandem_tolerance_options,
     pub bodies_at: *const tandem_bodies_at_options,
     pub configurations: *const tandem_configuration_options,
+    pub closest: *const tandem_closest_options,
+    pub rays: *const tandem_ray_options,
 }
 
 #[repr(C)]
@@ -680,6 +755,8 @@ pub struct tandem_counters {
     pub verdicts: tandem_tolerance_counters,
     pub moved: tandem_moved_counters,
     pub configurations: tandem_configuration_counters,
+    pub closest: tandem_closest_counters,
+    pub rays: tandem_ray_counters,
 }
 
 #[repr(C)]
@@ -841,6 +918,10 @@ extern "C" {
     pub fn tandem_scene_bodies_at(scene: *const tandem_scene, count: *mut usize) -> *const tandem_body_at;
     pub fn tandem_scene_find_configurations(scene: *mut tandem_scene, options: *const tandem_configuration_options) -> tandem_status;
     pub fn tandem_scene_configurations(scene: *const tandem_scene, count: *mut usize) -> *const tandem_configuration_pair;
+    pub fn tandem_scene_find_closest(scene: *mut tandem_scene, options: *const tandem_closest_options) -> tandem_status;
+    pub fn tandem_scene_closest(scene: *const tandem_scene, count: *mut usize) -> *const tandem_closest_point;
+    pub fn tandem_scene_find_rays(scene: *mut tandem_scene, options: *const tandem_ray_options) -> tandem_status;
+    pub fn tandem_scene_rays(scene: *const tandem_scene, count: *mut usize) -> *const tandem_ray_hit;
     pub fn tandem_scene_find(scene: *mut tandem_scene, questions: *const tandem_questions) -> tandem_status;
     pub fn tandem_scene_get_counters(scene: *const tandem_scene, counters: *mut tandem_counters) -> tandem_status;
     pub fn tandem_world_create(options: *const tandem_world_options, allocator: *const tandem_allocator, world: *mut *mut tandem_world) -> tandem_status;

@@ -48,6 +48,15 @@ struct Same_tandem_configuration_pair { using Ours = ConfigurationPair; using Th
   TANDEM_SAME(configuration); TANDEM_SAME(a); TANDEM_SAME(b); };
 struct Same_tandem_configuration_counters { using Ours = ConfigurationCounters; using Theirs = tandem_configuration_counters; TANDEM_SAME_SIZE();
   TANDEM_SAME(configurations); TANDEM_SAME(touching); TANDEM_SAME(object_pairs); TANDEM_SAME(block_pairs); };
+struct Same_tandem_closest_point { using Ours = ClosestPoint; using Theirs = tandem_closest_point; TANDEM_SAME_SIZE(); TANDEM_SAME(lower);
+  TANDEM_SAME(upper); TANDEM_SAME(position); TANDEM_SAME(body); TANDEM_SAME(triangle); TANDEM_SAME(face); TANDEM_SAME(within); TANDEM_SAME(winding);
+  };
+struct Same_tandem_closest_counters { using Ours = ClosestCounters; using Theirs = tandem_closest_counters; TANDEM_SAME_SIZE(); TANDEM_SAME(points);
+  TANDEM_SAME(blocks); TANDEM_SAME(by_float64); };
+struct Same_tandem_ray_hit { using Ours = RayHit; using Theirs = tandem_ray_hit; TANDEM_SAME_SIZE(); TANDEM_SAME(t); TANDEM_SAME(weight);
+  TANDEM_SAME(ray); TANDEM_SAME(body); TANDEM_SAME(triangle); TANDEM_SAME(face); };
+struct Same_tandem_ray_counters { using Ours = RayCounters; using Theirs = tandem_ray_counters; TANDEM_SAME_SIZE(); TANDEM_SAME(rays);
+  TANDEM_SAME(hits); TANDEM_SAME(blocks); TANDEM_SAME(by_float64); };
 struct Same_tandem_body_motion { using Ours = BodyMotion; using Theirs = tandem_body_motion; TANDEM_SAME_SIZE(); TANDEM_SAME(pose);
   TANDEM_SAME(centre); TANDEM_SAME(velocity); TANDEM_SAME(angular_velocity); TANDEM_SAME(sleeps); };
 struct Same_tandem_world_contact { using Ours = WorldContact; using Theirs = tandem_world_contact; TANDEM_SAME_SIZE(); TANDEM_SAME(a); TANDEM_SAME(b);

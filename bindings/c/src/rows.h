@@ -1,15 +1,18 @@
 #pragma once
+#include <array>
 #include <cstddef>
 #include <span>
 
 #include "entry.h"
 #include "tandem/dynamics/world.h"
 #include "tandem/kernels/bodies_at_query.h"
+#include "tandem/kernels/closest_query.h"
 #include "tandem/kernels/configuration_query.h"
 #include "tandem/kernels/containment_query.h"
 #include "tandem/kernels/distance_query.h"
 #include "tandem/kernels/impact_query.h"
 #include "tandem/kernels/manifold_query.h"
+#include "tandem/kernels/ray_query.h"
 #include "tandem/kernels/tolerance_query.h"
 
 // Assertions that a row of a library, Ours, and that of the interface, Theirs, lie alike.
@@ -36,6 +39,8 @@ static_assert(TANDEM_INSIDE == int(kInside) && TANDEM_OUTER_OPEN == int(kOuterOp
 static_assert(TANDEM_APART == int(ToleranceVerdict::apart) &&
               TANDEM_TOUCH == int(ToleranceVerdict::touching) &&
               TANDEM_WITHIN_TOLERANCE == int(ToleranceVerdict::within_tolerance));
+static_assert(TANDEM_FIRST_HIT == int(RayHits::first) && TANDEM_ANY_HIT == int(RayHits::any) &&
+              TANDEM_ALL_HITS == int(RayHits::all));
 static_assert(TANDEM_NO_IMPACT == int(ImpactStatus::none) && TANDEM_IMPACT == int(ImpactStatus::found) &&
               TANDEM_IMPACT_AT_START == int(ImpactStatus::at_start));
 
@@ -43,6 +48,11 @@ static_assert(TANDEM_NO_IMPACT == int(ImpactStatus::none) && TANDEM_IMPACT == in
 template <typename Row, typename Given>
 std::span<const Row> rows(const Given* given, size_t count) {
   return {reinterpret_cast<const Row*>(given), count};
+}
+
+/// Points or directions, three numbers each.
+inline std::span<const std::array<double, 3>> triples(const double* given, size_t count) {
+  return {reinterpret_cast<const std::array<double, 3>*>(given), count};
 }
 
 /// The libraries' rows as the caller reads them, null where there are none; count: or null.

@@ -42,6 +42,8 @@ struct tandem_scene : Allocated {
   Asked<ToleranceQuery> verdicts;
   Asked<BodiesAtQuery> bodies_at;
   Asked<ConfigurationQuery> configurations;
+  Asked<ClosestQuery> closest;
+  Asked<RayQuery> rays;
 
   ~tandem_scene() { keep(nullptr); }
 
@@ -139,7 +141,29 @@ tandem_status read_options(const tandem_tolerance_options& given, ToleranceOptio
 tandem_status read_options(const tandem_bodies_at_options& given, BodiesAtOptions& options) {
   if (given.reserved != 0) return TANDEM_BAD_OPTION;
   if (!is_there(given.points, given.point_count)) return TANDEM_NULL_ARGUMENT;
-  options.points = {reinterpret_cast<const std::array<double, 3>*>(given.points), given.point_count};
+  options.points = triples(given.points, given.point_count);
+  return TANDEM_OK;
+}
+
+tandem_status read_options(const tandem_closest_options& given, ClosestOptions& options) {
+  if (given.limit_reach > 1 || given.sides > 1 || given.reserved != 0) return TANDEM_BAD_OPTION;
+  if (!is_there(given.points, given.point_count)) return TANDEM_NULL_ARGUMENT;
+  options.points = triples(given.points, given.point_count);
+  options.tolerance.absolute = given.absolute_tolerance;
+  if (given.relative_tolerance != 0) options.tolerance.relative = given.relative_tolerance;
+  if (given.limit_reach != 0) options.reach = given.reach;
+  options.sides = given.sides != 0;
+  return TANDEM_OK;
+}
+
+tandem_status read_options(const tandem_ray_options& given, RayOptions& options) {
+  if (given.limit_reach > 1 || given.reserved != 0) return TANDEM_BAD_OPTION;
+  if (!is_there(given.origins, given.ray_count) || !is_there(given.directions, given.ray_count))
+    return TANDEM_NULL_ARGUMENT;
+  options.origins = triples(given.origins, given.ray_count);
+  options.directions = triples(given.directions, given.ray_count);
+  if (given.limit_reach != 0) options.reach = given.reach;
+  options.hits = static_cast<RayHits>(given.hits);
   return TANDEM_OK;
 }
 
@@ -269,7 +293,7 @@ tandem_status tandem_scene_set_assets(tandem_scene* scene, tandem_asset* const* 
   return enter(scene, [&](tandem_scene& self) {
     self.forget_contacts();
     self.pairs_found = self.moved.found = self.distances.found = self.impacts.found = self.verdicts.found =
-        self.bodies_at.found = self.configurations.found = false;
+        self.bodies_at.found = self.configurations.found = self.closest.found = self.rays.found = false;
     // Points of before are not those of other assets.
     self.manifolds.query.forget_points();
     const tandem_status status = self.assets.replace(
@@ -442,6 +466,8 @@ TANDEM_SCENE_QUESTION(impacts, tandem_impact_options, tandem_impact)
 TANDEM_SCENE_QUESTION(verdicts, tandem_tolerance_options, tandem_verdict)
 TANDEM_SCENE_QUESTION(bodies_at, tandem_bodies_at_options, tandem_body_at)
 TANDEM_SCENE_QUESTION(configurations, tandem_configuration_options, tandem_configuration_pair)
+TANDEM_SCENE_QUESTION(closest, tandem_closest_options, tandem_closest_point)
+TANDEM_SCENE_QUESTION(rays, tandem_ray_options, tandem_ray_hit)
 
 tandem_status tandem_scene_find(tandem_scene* scene, const tandem_questions* questions) {
   return enter(scene, [&](tandem_scene& self) -> tandem_status {
@@ -461,6 +487,8 @@ tandem_status tandem_scene_find(tandem_scene* scene, const tandem_questions* que
     ask(tandem_scene_find_verdicts, read.verdicts);
     ask(tandem_scene_find_bodies_at, read.bodies_at);
     ask(tandem_scene_find_configurations, read.configurations);
+    ask(tandem_scene_find_closest, read.closest);
+    ask(tandem_scene_find_rays, read.rays);
     return status;
   });
 }
@@ -481,6 +509,8 @@ tandem_status tandem_scene_get_counters(const tandem_scene* scene, tandem_counte
   copy_counters(scene->verdicts, filled.verdicts);
   copy_counters(scene->moved, filled.moved);
   copy_counters(scene->configurations, filled.configurations);
+  copy_counters(scene->closest, filled.closest);
+  copy_counters(scene->rays, filled.rays);
   return write_struct(filled, counters);
 }
 

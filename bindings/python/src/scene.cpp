@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <memory>
 
 #include "core.h"
@@ -222,6 +223,34 @@ class Scene {
     return answer<tandem_scene_find_configurations, tandem_scene_configurations>(options);
   }
 
+  nb::object closest(nb::handle points, nb::handle reach, double absolute_tolerance,
+                     double relative_tolerance, bool sides) {
+    const Turn turn = take_turn();
+    const auto coordinates = copy_rows<double>(points);
+    auto options = sized<tandem_closest_options>();
+    options.points = coordinates.data();
+    options.point_count = coordinates.size() / 3;
+    options.limit_reach = !reach.is_none();
+    if (!reach.is_none()) options.reach = nb::cast<double>(reach);
+    options.absolute_tolerance = absolute_tolerance;
+    options.relative_tolerance = relative_tolerance;
+    options.sides = sides;
+    return answer<tandem_scene_find_closest, tandem_scene_closest>(options);
+  }
+
+  nb::object rays(nb::handle origins, nb::handle directions, nb::handle reach, std::uint32_t hits) {
+    const Turn turn = take_turn();
+    const auto from = copy_rows<double>(origins), along = copy_rows<double>(directions);
+    auto options = sized<tandem_ray_options>();
+    options.origins = from.data();
+    options.directions = along.data();
+    options.ray_count = std::min(from.size(), along.size()) / 3;
+    options.limit_reach = !reach.is_none();
+    if (!reach.is_none()) options.reach = nb::cast<double>(reach);
+    options.hits = hits;
+    return answer<tandem_scene_find_rays, tandem_scene_rays>(options);
+  }
+
  private:
   static std::vector<tandem_pose> poses_of(nb::handle instances) {
     std::vector<tandem_pose> poses;
@@ -308,7 +337,9 @@ void add_scenes(nb::module_& module) {
       .def("impacts", &Scene::impacts, nb::arg(), nb::arg(), none(), nb::arg())
       .def("verdicts", &Scene::verdicts, nb::arg(), none())
       .def("bodies_at", &Scene::bodies_at)
-      .def("configurations", &Scene::configurations);
+      .def("configurations", &Scene::configurations)
+      .def("closest", &Scene::closest, nb::arg(), none(), nb::arg(), nb::arg(), nb::arg())
+      .def("rays", &Scene::rays, nb::arg(), nb::arg(), none(), nb::arg());
 }
 
 }  // namespace tandem::python

@@ -15,7 +15,7 @@ from ._arrays import instances, rotations
 from ._asset import Asset, Level, Part
 from ._build import BuildReport, Mesh, build, read_mesh
 from ._errors import Error, FileError
-from ._rows import BODY_AT, BODY_MOTION, CONFIGURATION_PAIR, CONTACT, CONTAINMENT, DISTANCE, FORMER, IMPACT, INSTANCE, JOINT, MANIFOLD, MOTION, NO_INDEX, PAIR, POINT, VERDICT, WORLD_CONTACT, WORLD_JOINT, WORLD_TOUCH
+from ._rows import BODY_AT, BODY_MOTION, CLOSEST_POINT, CONFIGURATION_PAIR, CONTACT, CONTAINMENT, DISTANCE, FORMER, IMPACT, INSTANCE, JOINT, MANIFOLD, MOTION, NO_INDEX, PAIR, POINT, RAY_HIT, VERDICT, WORLD_CONTACT, WORLD_JOINT, WORLD_TOUCH
 from ._scene import EVERY_WORLD, Configurations, Contacts, Contained, Counters, Distances, Filter, Impacts, Manifolds, Moved, Scene, Verdicts
 from ._world import Joint, World, WorldState
 
@@ -48,8 +48,8 @@ def view(what: _Any, instances: _Any = None, **options: _Any) -> _Any:
 __version__ = f"{_tandem.version // 10000}.{_tandem.version // 100 % 100}.{_tandem.version % 100}"
 
 __all__ = [
-    "AMBIGUOUS", "APART", "BODY_MOTION", "CONFIGURATION_PAIR", "CONTACT", "CONTAINMENT", "DISTANCE", "EVERY_WORLD", "FIXED", "FORMER", "GOES_THROUGH", "IMPACT", "IMPACT_AT_START", "IMPACT_IN_STEP", "INSIDE", "INSTANCE",
-    "JOINT", "KINEMATIC", "MANIFOLD", "MOTION", "MOVING", "NO_IMPACT", "NO_INDEX", "OPEN_CURVE", "OUTER_OPEN", "PAIR", "POINT", "SLEEPING", "TOUCH", "TOUCHING", "VERDICT",
+    "AMBIGUOUS", "APART", "BODY_MOTION", "CLOSEST_POINT", "CONFIGURATION_PAIR", "CONTACT", "CONTAINMENT", "DISTANCE", "EVERY_WORLD", "FIXED", "FORMER", "GOES_THROUGH", "IMPACT", "IMPACT_AT_START", "IMPACT_IN_STEP", "INSIDE", "INSTANCE",
+    "JOINT", "KINEMATIC", "MANIFOLD", "MOTION", "MOVING", "NO_IMPACT", "NO_INDEX", "OPEN_CURVE", "OUTER_OPEN", "PAIR", "POINT", "RAY_HIT", "SLEEPING", "TOUCH", "TOUCHING", "VERDICT",
     "WITHIN_TOLERANCE", "WORLD_CONTACT", "WORLD_JOINT", "WORLD_TOUCH", "Asset", "BuildReport", "Configurations", "Contacts", "Contained", "Counters", "Distances", "Error", "FileError", "Filter", "Impacts", "Joint", "Level", "Manifolds", "Mesh",
     "Moved", "Part", "Scene", "Verdicts", "World", "WorldState", "build", "instances", "read_mesh", "rotations", "view",
 ]

@@ -2,7 +2,7 @@
 wherever it copies. Written by scripts/write_interface from it. Do not edit it."""
 import numpy as np
 
-__all__ = ["BODY_AT", "BODY_MOTION", "CONFIGURATION_PAIR", "CONTACT", "CONTAINMENT", "DISTANCE", "FORMER", "IMPACT", "INSTANCE", "JOINT", "MANIFOLD", "MOTION", "NO_INDEX", "PAIR", "POINT", "VERDICT", "WORLD_CONTACT", "WORLD_JOINT", "WORLD_TOUCH"]
+__all__ = ["BODY_AT", "BODY_MOTION", "CLOSEST_POINT", "CONFIGURATION_PAIR", "CONTACT", "CONTAINMENT", "DISTANCE", "FORMER", "IMPACT", "INSTANCE", "JOINT", "MANIFOLD", "MOTION", "NO_INDEX", "PAIR", "POINT", "RAY_HIT", "VERDICT", "WORLD_CONTACT", "WORLD_JOINT", "WORLD_TOUCH"]
 
 #: What is not there: a triangle, a face, a former point, the asset of a removed body.
 NO_INDEX = 0xFFFFFFFF
@@ -37,6 +37,11 @@ VERDICT = np.dtype([("verdict", "u1"), ("level_a", "u1"), ("level_b", "u1")])
 BODY_AT = np.dtype([("point", "<u4"), ("body", "<u4")])
 #: Two bodies that touch in a configuration; a < b.
 CONFIGURATION_PAIR = np.dtype([("configuration", "<u4"), ("a", "<u4"), ("b", "<u4")])
+#: The closest point of the bodies of a scene (docs/points_and_rays.md).
+CLOSEST_POINT = np.dtype([("lower", "<f8"), ("upper", "<f8"), ("position", "<f8", (3,)), ("body", "<u4"), ("triangle", "<u4"), ("face", "<u4"),
+        ("within", "<u4"), ("winding", "<i4"), ("reserved", "<u4")])
+#: A place where a ray meets a triangle of a body (docs/points_and_rays.md).
+RAY_HIT = np.dtype([("t", "<f8"), ("weight", "<f8", (2,)), ("ray", "<u4"), ("body", "<u4"), ("triangle", "<u4"), ("face", "<u4")])
 #: Where a body is, and how it moves. The place of a body: world = rotation x + translation, x in the mesh file's coordinates; rows of the rotation
 #: are consecutive. Rigid to 1e-6, else TANDEM_POSE_NOT_RIGID.
 BODY_MOTION = np.dtype([("rotation", "<f8", (3, 3)), ("translation", "<f8", (3,)), ("centre", "<f8", (3,)), ("velocity", "<f8", (3,)),

@@ -12,7 +12,7 @@ from ._arrays import FARTHEST, FINITE, Rotations, Rows, amount, flag, floats, in
 from ._asset import Asset, _choice
 from ._errors import Error
 from ._poses import explained
-from ._rows import BODY_AT, CONFIGURATION_PAIR, CONTACT, CONTAINMENT, DISTANCE, FORMER, IMPACT, INSTANCE, MANIFOLD, MOTION, PAIR, POINT, VERDICT
+from ._rows import BODY_AT, CLOSEST_POINT, CONFIGURATION_PAIR, CONTACT, CONTAINMENT, DISTANCE, FORMER, IMPACT, INSTANCE, MANIFOLD, MOTION, PAIR, POINT, RAY_HIT, VERDICT
 
 __all__ = ["EVERY_WORLD", "Configurations", "Contacts", "Contained", "Counters", "Distances", "Filter", "Impacts", "Manifolds", "Moved", "Scene", "Verdicts"]
 
@@ -528,3 +528,39 @@ class Scene:
         [(0, 0), (1, 0), (1, 1)]
         """
         return _frombuffer(self._core.bodies_at(floats(points, "points", 3)), BODY_AT)
+
+    def closest(self, points: npt.ArrayLike, *, reach: float | None = None, absolute_tolerance: float = 0.0, relative_tolerance: float = 0.0,
+                sides: bool = False) -> Rows:
+        """Finds the closest point of the bodies' surfaces to each of the points, (n, 3) or one: array of CLOSEST_POINT, a row for each.
+
+        `lower` <= distance <= `upper`, both 0 exactly where the point is on a triangle; `upper` - `lower` is at most the larger of the
+        absolute tolerance and the relative one, 0: 1e-6, times `upper`. reach: what is surely farther away has no closest point, its
+        `body` is NO_INDEX and `upper` infinite. sides: also `within`, the lowest body that the point is inside of, or NO_INDEX, and
+        `winding`, how often closed surfaces wind around it, both decided exactly.
+
+        >>> row = scene.place(translation=[[0, 0, 0], [3, 0, 0]]).closest([0.5, 0.5, 0.75], sides=True)[0]
+        >>> round(float(row["upper"]), 9), row["position"].tolist(), int(row["within"]), int(row["winding"])
+        (0.25, [0.5, 0.5, 1.0], 0, 1)
+        """
+        return _frombuffer(self._core.closest(floats(points, "points", 3), None if reach is None else amount(reach, "reach", np.inf),
+                                              amount(absolute_tolerance, "absolute_tolerance", np.inf),
+                                              amount(relative_tolerance, "relative_tolerance", np.inf), bool(sides)), CLOSEST_POINT)
+
+    def rays(self, origins: npt.ArrayLike, directions: npt.ArrayLike, *, reach: float | None = None, hits: str = "first") -> Rows:
+        """Finds where rays origin + t direction, 0 <= t <= reach, meet the bodies: array of RAY_HIT.
+
+        origins, directions: (n, 3) or one each. hits: "first" gives a row for each ray with the hit of the least `t`, "any" with some
+        hit; without a hit `body` is NO_INDEX and `t` infinite. "all" gives a row for each triangle that a ray meets, by ascending ray,
+        `t`, body and triangle. Whether a ray meets a triangle, its edges and corners included, and what comes first are decided
+        exactly; `t` is within 2^-40 of itself. `weight`: of the triangle's corners 1 and 2 at the hit, within 2^-30.
+
+        >>> scene.place(translation=[[0, 0, 0], [3, 0, 0]]).rays([-2, 0.25, 0.5], [1, 0, 0])[["t", "body"]].tolist()
+        [(2.0, 0)]
+        """
+        numbers = {"first": 0, "any": 1, "all": 2}
+        if hits not in numbers:
+            raise ValueError(f"hits: {hits!r} is none of {', '.join(numbers)}")
+        from_, along = floats(origins, "origins", 3), floats(directions, "directions", 3)
+        if from_.shape != along.shape:
+            raise ValueError(f"directions: there are {along.size // 3}, and {from_.size // 3} origins")
+        return _frombuffer(self._core.rays(from_, along, None if reach is None else amount(reach, "reach", np.inf), numbers[hits]), RAY_HIT)

@@ -125,7 +125,8 @@ TEST(ExactSigns, AgreeWithRationalNumbers) {
       const TrianglePair t = family.make(random);
       const int expected = oracle_volume_sign(t.a[0], t.a[1], t.a[2], t.b[0]);
       ASSERT_EQ(detail::ExactSigns::volume(t.a[0], t.a[1], t.a[2], t.b[0]), expected) << text(t);
-      ASSERT_EQ(detail::wide_volume_sign(t.a[0], t.a[1], t.a[2], t.b[0]), expected) << text(t);
+      ASSERT_EQ((detail::wide_volume_sign({t.a[0], t.a[1]}, {t.a[0], t.a[2]}, {t.a[0], t.b[0]})), expected)
+          << text(t);
     }
   }
 }
@@ -143,8 +144,8 @@ TEST(ExactSigns, ExpansionsAgreeWithWideIntegersInTheirRange) {
     for (int i = 0; i < pairs_per_family(); ++i) {
       const TrianglePair t = family.make(random);
       if (!all_in_range(t)) continue;
-      ASSERT_EQ(detail::expansion_volume_sign(t.a[0], t.a[1], t.a[2], t.b[0]),
-                detail::wide_volume_sign(t.a[0], t.a[1], t.a[2], t.b[0]))
+      ASSERT_EQ((detail::expansion_volume_sign({t.a[0], t.a[1]}, {t.a[0], t.a[2]}, {t.a[0], t.b[0]})),
+                (detail::wide_volume_sign({t.a[0], t.a[1]}, {t.a[0], t.a[2]}, {t.a[0], t.b[0]})))
           << text(t);
       for (int k = 0; k < 3; ++k) {
         ASSERT_EQ(detail::expansion_area_sign(t.a[0], t.a[1], t.b[0], k),
@@ -167,8 +168,11 @@ TEST(ExactSigns, ExpansionsKeepTheLastBitOfTheSmallestNumbers) {
     const double u[3] = {m, less, m}, v[3] = {more, m, more};  // u x v = {-1, 0, 1} units squared
     for (const double w_z : {less, m, more}) {
       const double w[3] = {m, m, w_z};
-      ASSERT_EQ(detail::expansion_volume_sign(kOrigin, u, v, w), (w_z > m) - (w_z < m)) << m / kUnit;
-      ASSERT_EQ(detail::wide_volume_sign(kOrigin, u, v, w), (w_z > m) - (w_z < m)) << m / kUnit;
+      ASSERT_EQ((detail::expansion_volume_sign({kOrigin, u}, {kOrigin, v}, {kOrigin, w})),
+                (w_z > m) - (w_z < m))
+          << m / kUnit;
+      ASSERT_EQ((detail::wide_volume_sign({kOrigin, u}, {kOrigin, v}, {kOrigin, w})), (w_z > m) - (w_z < m))
+          << m / kUnit;
     }
   }
 }
@@ -188,8 +192,8 @@ TEST(ExactSigns, ExpansionsAreExactAtTheEndsOfTheirRange) {
       }
     }
     ASSERT_TRUE(detail::in_range(p[0]) && detail::in_range(p[1]) && detail::in_range(p[2]));
-    ASSERT_EQ(detail::expansion_volume_sign(p[0], p[1], p[2], p[3]),
-              detail::wide_volume_sign(p[0], p[1], p[2], p[3]));
+    ASSERT_EQ((detail::expansion_volume_sign({p[0], p[1]}, {p[0], p[2]}, {p[0], p[3]})),
+              (detail::wide_volume_sign({p[0], p[1]}, {p[0], p[2]}, {p[0], p[3]})));
   }
 }
 

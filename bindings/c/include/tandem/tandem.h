@@ -96,7 +96,7 @@ enum {
   TANDEM_BAD_REACH = 213, TANDEM_BAD_TOLERANCE = 214, TANDEM_BAD_DURATION = 215, TANDEM_NO_MASS = 216,
   TANDEM_BAD_JOINT = 217, TANDEM_NO_AXIS = 218, TANDEM_JOINS_NOTHING = 219,
   TANDEM_NO_SOURCE_VERTICES = 220, TANDEM_VERTEX_COUNT_MISMATCH = 221, TANDEM_DEFORMED = 222,
-  TANDEM_NOT_FLOAT32 = 223,
+  TANDEM_NOT_FLOAT32 = 223, TANDEM_NO_DIRECTION = 224,
   // A GPU (tandem_cuda.h).
   TANDEM_NO_GPU = 300, TANDEM_DRIVER_TOO_OLD = 301, TANDEM_GPU_NOT_SUPPORTED = 302,
   TANDEM_OUT_OF_GPU_MEMORY = 303, TANDEM_CUDA_FAILED = 304
@@ -815,6 +815,82 @@ TANDEM_API tandem_status tandem_scene_find_configurations(tandem_scene* scene,
 TANDEM_API const tandem_configuration_pair* tandem_scene_configurations(const tandem_scene* scene,
                                                                         size_t* count);
 
+/// ---- Points and rays
+
+typedef struct tandem_closest_options {
+  uint32_t struct_size;
+  uint32_t limit_reach;  ///< 1: points surely farther away than `reach` have no closest point
+  uint32_t sides;        ///< 1: `within` and `winding` are asked for
+  uint32_t reserved;
+  double reach;
+  double absolute_tolerance;  ///< upper - lower <= max(absolute, relative * upper)
+  double relative_tolerance;  ///< 0: 1e-6; at the finest 2^-48
+  const double* points;       ///< in the world, x, y, z of each
+  size_t point_count;
+} tandem_closest_options;
+
+/// The closest point of the bodies of a scene (docs/points_and_rays.md).
+typedef struct tandem_closest_point {
+  double lower, upper;  ///< lower <= distance <= upper; 0, 0 exactly where the point is on a triangle
+  double position[3];   ///< the closest point that was found
+  uint32_t body;        ///< that it is on; TANDEM_NO_INDEX: all are beyond reach
+  uint32_t triangle, face;
+  uint32_t within;  ///< the lowest body that the point is inside of; TANDEM_NO_INDEX: none, or not asked
+  int32_t winding;  ///< how often the closed surfaces of all bodies wind around the point
+  uint32_t reserved;
+} tandem_closest_point;
+
+typedef struct tandem_closest_counters {
+  uint64_t points;
+  uint64_t blocks;      ///< four boxes or four triangles each
+  uint64_t by_float64;  ///< triangles that float64 bounded
+} tandem_closest_counters;
+
+/// Finds the closest points of the bodies' surfaces. Result: TANDEM_OUT_OF_RANGE, where `where` is the point;
+/// TANDEM_BAD_TOLERANCE or TANDEM_BAD_REACH where a tolerance or the reach is negative or NaN;
+/// TANDEM_NO_TOPOLOGY, where sides are asked for and `where` is an asset whose file has none.
+TANDEM_API tandem_status tandem_scene_find_closest(tandem_scene* scene,
+                                                   const tandem_closest_options* options);
+/// Returns the row of each point.
+TANDEM_API const tandem_closest_point* tandem_scene_closest(const tandem_scene* scene, size_t* count);
+
+/// The hit of the least parameter of each ray; some hit of each; or all hits.
+enum { TANDEM_FIRST_HIT = 0, TANDEM_ANY_HIT = 1, TANDEM_ALL_HITS = 2 };
+
+typedef struct tandem_ray_options {
+  uint32_t struct_size;
+  uint32_t hits;         ///< TANDEM_FIRST_HIT, TANDEM_ANY_HIT or TANDEM_ALL_HITS
+  uint32_t limit_reach;  ///< 1: parameters beyond `reach` do not count
+  uint32_t reserved;
+  double reach;
+  const double* origins;     ///< in the world, x, y, z of each
+  const double* directions;  ///< of any length but 0
+  size_t ray_count;
+} tandem_ray_options;
+
+/// A place where a ray meets a triangle of a body (docs/points_and_rays.md).
+typedef struct tandem_ray_hit {
+  double t;          ///< the parameter, within 2^-40 of itself; infinite: there is no hit
+  double weight[2];  ///< of corners 1 and 2, within 2^-30
+  uint32_t ray;
+  uint32_t body;  ///< TANDEM_NO_INDEX: there is no hit
+  uint32_t triangle, face;
+} tandem_ray_hit;
+
+typedef struct tandem_ray_counters {
+  uint64_t rays;
+  uint64_t hits;        ///< rows with a hit
+  uint64_t blocks;      ///< four boxes or four triangles each
+  uint64_t by_float64;  ///< triangles that float32 did not rule out
+} tandem_ray_counters;
+
+/// Finds where rays meet the bodies; decides exactly which do, and what is hit first. Result:
+/// TANDEM_OUT_OF_RANGE or, where the direction is 0, TANDEM_NO_DIRECTION, where `where` is the ray;
+/// TANDEM_BAD_REACH where the reach is negative or NaN.
+TANDEM_API tandem_status tandem_scene_find_rays(tandem_scene* scene, const tandem_ray_options* options);
+/// Returns the row of each ray, or all hits by ascending ray, parameter, body and triangle.
+TANDEM_API const tandem_ray_hit* tandem_scene_rays(const tandem_scene* scene, size_t* count);
+
 /// ---- Several questions
 
 /// The questions that tandem_scene_find() asks. Null: the question is not asked.
@@ -829,6 +905,8 @@ typedef struct tandem_questions {
   const tandem_tolerance_options* verdicts;
   const tandem_bodies_at_options* bodies_at;
   const tandem_configuration_options* configurations;
+  const tandem_closest_options* closest;
+  const tandem_ray_options* rays;
 } tandem_questions;
 
 /// Asks several questions, in the order of tandem_questions but bodies within others behind manifolds, until
@@ -848,6 +926,8 @@ typedef struct tandem_counters {
   tandem_tolerance_counters verdicts;
   tandem_moved_counters moved;
   tandem_configuration_counters configurations;
+  tandem_closest_counters closest;
+  tandem_ray_counters rays;
 } tandem_counters;
 
 TANDEM_API tandem_status tandem_scene_get_counters(const tandem_scene* scene, tandem_counters* counters);

@@ -95,6 +95,7 @@ enum class [[nodiscard]] Status : std::uint32_t{
     kVertexCountMismatch,  ///< not as many positions as the asset has source vertices
     kDeformed,             ///< the question is not offered for deformed assets
     kNotFloat32,           ///< the question is not offered where positions are no float32 numbers
+    kNoDirection,          ///< a ray whose direction is 0
     // These are of a GPU; status_of() of gpu_status.h names CUDA's errors.
     kNoGpu = 300,      ///< none here, none that this process may use, or no driver
     kDriverTooOld,     ///< for the CUDA version that the program was built with

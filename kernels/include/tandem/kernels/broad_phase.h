@@ -1,10 +1,10 @@
 #pragma once
-#include <compare>
 #include <cstdint>
 #include <memory>
 #include <span>
 
 #include "tandem/formats/status.h"
+#include "tandem/kernels/detail/box_tree.h"
 #include "tandem/kernels/detail/buffer.h"
 #include "tandem/kernels/object_pair.h"
 #include "tandem/kernels/pair_filter.h"
@@ -51,6 +51,12 @@ class BroadPhase {
 
   void forget_fixed();
 
+  /// Makes the tree of all boxes, for walks of it. Result: as of find_pairs(). Condition: none are kept.
+  Status make_tree(std::span<const WorldBox> boxes, WorkerThreads& threads, std::uint32_t workers);
+
+  /// The tree that make_tree() made; valid until the next call. It has no groups where there are no boxes.
+  const BoxTree& tree() const { return tree_; }
+
   /// Returns the number of boxes whose fixed ones are kept, 0 where none are.
   std::size_t kept_of() const { return kept_of_; }
 
@@ -72,51 +78,18 @@ class BroadPhase {
   std::uint64_t group_pairs() const { return group_pairs_; }
 
  private:
-  static constexpr int kGroup = 4;
+  static constexpr int kGroup = BoxTree::kGroup;
 
-  /// A box on its way to its place in the tree.
-  struct Item {
-    double centre[3];
-    std::uint32_t box, world;
-  };
-
-  /// Four boxes, or the boxes of four groups; where there are fewer, the others are empty, [inf, -inf].
-  struct alignas(64) Group {
-    double lo[3][kGroup], hi[3][kGroup];
-  };
-
-  /// What a filter says of a box, or of all boxes of a group together: their groups and masks, a bit for
-  /// each of their motions and for each that meets one of these, and their worlds.
-  struct Kind {
-    std::uint32_t group = 0, mask = 0, motions = 0, met = 0;
-    WorldRange worlds;
-
-    bool before(const Kind& other) const;
-    void add(const Kind& more);
-    bool may_look_at(const Kind& other) const;
-  };
-  struct Kinds {
-    Kind of[kGroup];
-  };
+  using Tree = BoxTree;
+  using Item = BoxTree::Item;
+  using Group = BoxTree::Group;
+  using Kind = BoxTree::Kind;
+  using Kinds = BoxTree::Kinds;
 
   /// Items that make `units` runs of `unit` items, the last of which may be shorter. A unit is a power of
   /// four.
   struct Range {
     std::size_t begin, count, unit, units;
-  };
-
-  /// Items and groups over them; level 0 holds the items' boxes.
-  struct Tree {
-    Buffer<Item> items;                // in the order of the tree
-    Buffer<Group> groups;              // level by level
-    Buffer<Kinds> kinds;               // of the groups, where the filter tells instances apart; else none
-    std::size_t level_begin[17] = {};  // where each level of groups begins
-    int levels = 0;
-
-    bool reserve(std::size_t boxes, const PairFilter& filter);
-    int top() const { return levels - 1; }
-    const Group* level(int i) const { return groups.data() + level_begin[i]; }
-    const Kinds* kinds_of(int i) const { return kinds.data() + level_begin[i]; }
   };
 
   /// The trees that are traversed in tandem: the same one twice, or two.

@@ -1,4 +1,4 @@
-#include "kernels/containment/component_labels.h"
+#include "kernels/common/component_labels.h"
 
 #include <algorithm>
 

@@ -1,8 +1,6 @@
 #include "tandem/kernels/bodies_at_query.h"
 
-#include <cmath>
-
-#include "kernels/scene/scene_state.h"
+#include "kernels/points_and_rays/scene_probe.h"
 
 namespace tandem {
 namespace {
@@ -11,12 +9,6 @@ bool contains(const WorldBox& box, const std::array<double, 3>& point) {
   bool inside = true;
   for (int k = 0; k < 3; ++k) inside = inside && box.lo[k] <= point[k] && point[k] <= box.hi[k];
   return inside;
-}
-
-bool is_in_range(const std::array<double, 3>& point) {
-  bool in_range = true;
-  for (double x : point) in_range = in_range && std::abs(x) <= kLargestWorldCoordinate;
-  return in_range;
 }
 
 }  // namespace

@@ -1,0 +1,344 @@
+#include "tandem/kernels/closest_query.h"
+
+#include <algorithm>
+
+#include "kernels/common/check_options.h"
+#include "kernels/common/component_labels.h"
+#include "kernels/common/lane_variant.h"
+#include "kernels/contact/candidate.h"
+#include "kernels/geometry/inside_test.h"
+#include "kernels/geometry/triangle_distance.h"
+#include "kernels/points_and_rays/probe_ways.h"
+#include "kernels/points_and_rays/scene_probe.h"
+
+namespace tandem {
+namespace {
+
+// The search for the closest point of one point.
+struct ClosestSearch {
+  const SceneState* scene = nullptr;
+  DistanceTolerance tolerance;
+  double point[3];
+  std::uint32_t body;
+  double upper;  // of the distance; before one is found, what is at least so far is beyond reach
+  double lower;  // what was settled is not nearer
+  double floor;  // nor is what was passed over
+  TriangleDistance best;
+  std::uint32_t best_body, best_triangle;  // of `best`; kNoIndex: none
+
+  std::uint64_t blocks = 0, by_float64 = 0;
+
+  void begin(const std::array<double, 3>& p, double reach) {
+    std::copy_n(p.data(), 3, point);
+    upper = reach < HUGE_VAL ? std::nextafter(reach, HUGE_VAL) : reach;
+    lower = floor = best.interval.upper = HUGE_VAL;
+    best_body = best_triangle = kNoIndex;
+  }
+
+  // Bounds the distance of a triangle of the body by float64.
+  void settle(std::uint32_t triangle) {
+    ++by_float64;
+    const PosedTree& tree = scene->bodies[body];
+    TrianglePair pair;
+    pose_corners(tree.pose, tree.tree, triangle, pair.a);
+    for (double(&corner)[3] : pair.b) std::copy_n(point, 3, corner);
+    const TriangleDistance found = point_distance(pair, tolerance);
+    lower = std::min(lower, found.interval.lower);
+    upper = std::min(upper, found.interval.upper);
+    if (!(found.interval.upper < best.interval.upper)) return;
+    best = found;
+    best_body = body;
+    best_triangle = triangle;
+  }
+
+  // Settles what may be nearer than the tolerance lets pass, and the first in any case.
+  void settle(const ClosestCandidate* candidates, std::uint32_t count, const FrameLengths& lengths) {
+    std::uint32_t nearest = 0;
+    for (std::uint32_t i = 1; i < count; ++i) {
+      if (candidates[i].lower < candidates[nearest].lower) nearest = i;
+    }
+    settle(candidates[nearest].triangle);
+    for (std::uint32_t i = 0; i < count; ++i) {
+      if (i == nearest) continue;
+      const double least = static_cast<double>(candidates[i].lower) * lengths.least_in_world;
+      if (best_triangle != kNoIndex && !(least < nearness_below(tolerance, upper)))
+        floor = std::min(floor, least);
+      else
+        settle(candidates[i].triangle);
+    }
+  }
+};
+
+void take_candidates(PointTask& task, const ClosestCandidate* candidates, std::uint32_t count) {
+  ClosestSearch& search = *static_cast<ClosestSearch*>(task.context);
+  search.upper = std::min(search.upper, task.upper);
+  search.settle(candidates, count, *task.lengths);
+  task.upper = search.upper;
+}
+
+// How far a point is from a box at least.
+double distance_to(const WorldBox& box, const double (&p)[3]) {
+  double largest = 0, square = 0;
+  for (int k = 0; k < 3; ++k) {
+    const double gap = std::max({box.lo[k] - p[k], p[k] - box.hi[k], 0.0});
+    largest = std::max(largest, gap);
+    square += gap * gap;
+  }
+  // Squares may be too large or too small to be told.
+  return (largest < 0x1p500 && largest > 0x1p-500 ? std::sqrt(square) : largest) * (1 - 0x1p-50);
+}
+
+// Whether the ray of inside_test.h may meet a box.
+bool may_cross(const WorldBox& box, const double (&p)[3]) {
+  return box.lo[1] <= p[1] && p[1] <= box.hi[1] && box.lo[2] <= p[2] && p[2] <= box.hi[2] &&
+         p[0] <= box.hi[0];
+}
+
+// A walk by world boxes in float64, of a body that float32 cannot take. wanted(box), take(triangle).
+template <typename Wanted, typename Take>
+void walk_world_boxes(const PosedTree& tree, const Wanted& wanted, const Take& take, std::uint64_t& blocks) {
+  std::uint32_t stack[3 * kMaxDepth + 4], height = 0;
+  stack[height++] = 0;
+  while (height > 0) {
+    const Block& block = tree.tree.blocks[stack[--height]];
+    ++blocks;
+    for (int i = 0; i < kNodesPerBlock; ++i) {
+      if (block.kind[i] == NodeKind::imaginary || !wanted(node_world_box(tree.pose, block, i))) continue;
+      if (block.is_leaf_block())
+        take(block.index[i]);
+      else
+        stack[height++] = block.index[i];
+    }
+  }
+}
+
+// The triangles of an asset that belong to open components.
+struct SurfaceLabels {
+  bool any_closed;
+  std::uint32_t first;  // of the labels; kNoIndex: all triangles are of closed components
+};
+
+// What the ray from a point to +x crosses.
+struct CrossingCount {
+  const PosedTree* tree;
+  const double* point;
+  const std::uint32_t* labels;
+  std::int32_t winding = 0;
+  std::uint32_t crossings = 0;
+  float limit;
+
+  void take(std::uint32_t triangle) {
+    if (labels != nullptr && (labels[triangle] & containment::kOfOpenComponent) != 0) return;
+    double corner[3][3];
+    pose_corners(tree->pose, tree->tree, triangle, corner);
+    const int crossing = containment::ray_crossing(corner, point);
+    if (crossing == 0) return;
+    ++crossings;
+    winding += is_turned(tree->tree.topology[triangle].flags) ? -crossing : crossing;
+  }
+};
+
+float take_crossing(void* context, std::uint32_t triangle) {
+  CrossingCount& count = *static_cast<CrossingCount*>(context);
+  count.take(triangle);
+  return count.limit;
+}
+
+}  // namespace
+
+struct ClosestQuery::State : Allocated {
+  PointWalk walk = best_way(tandem::point_walk);
+  RayWalk walk_ray = best_way(tandem::ray_walk);
+  ProbedBodies bodies;
+  ProbeOrder order;
+  PerWorker<ClosestSearch> searches;
+  std::uint64_t labels_of = 0;  // the number of the assets
+  Buffer<SurfaceLabels> surfaces;
+  Buffer<std::uint32_t> labels;
+
+  Status label(SceneState& scene);
+  void walk_body(ClosestSearch& search) const;
+  void find(const ClosestOptions& options, ClosestSearch& search, ClosestPoint& row) const;
+  void find_sides(ClosestSearch& search, ClosestPoint& row) const;
+  void count_crossings(std::uint32_t body, ClosestSearch& search, CrossingCount& count) const;
+};
+
+Status ClosestQuery::State::label(SceneState& scene) {
+  if (const Status status = scene.require_topology(); status != Status::kOk) return status;
+  if (labels_of == scene.assets_id) return Status::kOk;
+  labels_of = 0;
+  surfaces.clear();
+  labels.clear();
+  std::size_t total = 0;
+  for (std::size_t i = 0; i < scene.assets.size(); ++i) {
+    const LevelView& level = scene.assets[i].tree;
+    const bool any_closed =
+        std::any_of(level.components, level.components + level.component_count, is_closed);
+    const bool labelled = any_closed && !level.closed;
+    if (total >= kNoIndex ||
+        !surfaces.push({any_closed, labelled ? static_cast<std::uint32_t>(total) : kNoIndex}))
+      return scene.fail(Status::kOutOfMemory, i);
+    if (labelled) total += level.triangle_count;
+  }
+  if (!labels.resize(total)) return scene.fail(Status::kOutOfMemory, 0);
+  for (std::size_t i = 0; i < scene.assets.size(); ++i) {
+    if (surfaces[i].first != kNoIndex &&
+        !containment::label_triangles(scene.assets[i].tree, labels.data() + surfaces[i].first))
+      return scene.fail(Status::kOutOfMemory, i);
+  }
+  labels_of = scene.assets_id;
+  return Status::kOk;
+}
+
+void ClosestQuery::State::walk_body(ClosestSearch& search) const {
+  const PosedTree& tree = search.scene->bodies[search.body];
+  const LocalFrame& frame = bodies.frame(search.body);
+  PointTask task;
+  if (!local_point(frame, search.point, task.point)) {
+    return walk_world_boxes(
+        tree, [&](const WorldBox& box) { return distance_to(box, search.point) < search.upper; },
+        [&](std::uint32_t triangle) { search.settle(triangle); }, search.blocks);
+  }
+  task.tree = &tree.tree;
+  task.lengths = &frame;
+  task.upper = search.upper;
+  task.take = take_candidates;
+  task.context = &search;
+  walk(task);
+  search.upper = std::min(search.upper, task.upper);
+  search.blocks += task.blocks;
+}
+
+void ClosestQuery::State::find(const ClosestOptions& options, ClosestSearch& search,
+                               ClosestPoint& row) const {
+  const auto bound = [&](const WorldBox& box) { return distance_to(box, search.point); };
+  bodies.visit(bound, search.upper, [&](std::uint32_t body) {
+    if (!search.scene->is_body(body)) return;
+    search.body = body;
+    walk_body(search);
+  });
+  row = {std::min({search.lower, search.floor, search.upper}),
+         HUGE_VAL,
+         {},
+         kNoIndex,
+         kNoIndex,
+         kNoIndex,
+         kNoIndex,
+         0,
+         0};
+  if (search.best_triangle != kNoIndex && row.lower <= options.reach) {
+    row.upper = std::min(search.upper, search.best.interval.upper);
+    std::copy_n(search.best.point_a, 3, row.position);
+    row.body = search.best_body;
+    row.triangle = search.best_triangle;
+    row.face = search.scene->bodies[row.body].tree.triangles[row.triangle].source_face();
+  }
+  if (options.sides) find_sides(search, row);
+}
+
+void ClosestQuery::State::count_crossings(std::uint32_t body, ClosestSearch& search,
+                                          CrossingCount& count) const {
+  const PosedTree& tree = search.scene->bodies[body];
+  const double along[3] = {1, 0, 0};
+  const WorldRay ray = world_ray(search.point, along, HUGE_VAL);
+  RayTask task;
+  const RayReach reach = local_ray(bodies.frame(body), ray, HUGE_VAL, task.ray);
+  if (reach == RayReach::misses) return;
+  if (reach == RayReach::out_of_range) {
+    return walk_world_boxes(
+        tree, [&](const WorldBox& box) { return may_cross(box, search.point); },
+        [&](std::uint32_t triangle) { count.take(triangle); }, search.blocks);
+  }
+  task.tree = &tree.tree;
+  task.limit = count.limit = task.ray.length;
+  task.take = take_crossing;
+  task.context = &count;
+  walk_ray(task);
+  search.blocks += task.blocks;
+}
+
+void ClosestQuery::State::find_sides(ClosestSearch& search, ClosestPoint& row) const {
+  const double limit = 0;
+  const auto bound = [&](const WorldBox& box) { return distance_to(box, search.point) == 0 ? 0 : HUGE_VAL; };
+  bodies.visit(bound, limit, [&](std::uint32_t body) {
+    if (!search.scene->is_body(body)) return;
+    const SurfaceLabels& surface = surfaces[search.scene->instances[body].asset];
+    if (!surface.any_closed) return;
+    CrossingCount count = {&search.scene->bodies[body],
+                           search.point,
+                           surface.first != kNoIndex ? labels.data() + surface.first : nullptr,
+                           0,
+                           0,
+                           0};
+    count_crossings(body, search, count);
+    row.winding += count.winding;
+    if (count.crossings % 2 != 0) row.within = std::min(row.within, body);
+  });
+}
+
+namespace {
+
+Status check(SceneState& scene, const ClosestOptions& options) {
+  if (options.points.size() >= kNoIndex) return scene.fail(Status::kBadOption, 0);
+  const Status status = check_distance_options(options.tolerance, options.reach);
+  if (status != Status::kOk) return scene.fail(status, 0);
+  for (std::size_t i = 0; i < options.points.size(); ++i) {
+    if (!is_in_range(options.points[i])) return scene.fail(Status::kOutOfRange, i);
+  }
+  return Status::kOk;
+}
+
+}  // namespace
+
+Status ClosestQuery::answer(SceneState& scene, const ClosestOptions& options) {
+  const std::size_t count = options.points.size();
+  State* const provided = state_.provide();
+  if (provided == nullptr) return scene.fail(Status::kOutOfMemory, 0);
+  State& state = *provided;
+  Status status = state.bodies.make(scene);
+  if (status == Status::kOk && options.sides) status = state.label(scene);
+  if (status != Status::kOk) return status;
+  const std::uint32_t workers = scene.workers_for(count, kProbesAtOnce);
+  if (!scene.threads.provide(workers)) return scene.fail(Status::kCannotStartThread, 0);
+  const auto place = [&](std::size_t i, double* out) { std::copy_n(options.points[i].data(), 3, out); };
+  if (!state.searches.provide(workers) || !state.order.make<3>(count, place) || !rows_.resize(count))
+    return scene.fail(Status::kOutOfMemory, 0);
+  for (std::uint32_t i = 0; i < workers; ++i) {
+    ClosestSearch& search = state.searches[i];
+    search.scene = &scene;
+    search.tolerance = options.tolerance;
+    search.blocks = search.by_float64 = 0;
+  }
+  // Each point's search begins with the triangle that was closest to the one before it in the part.
+  const auto find = [&](std::size_t first, std::size_t last, std::uint32_t worker) {
+    ClosestSearch& search = state.searches[worker];
+    for (std::size_t i = first; i < last; ++i) {
+      const std::uint32_t body = search.best_body, triangle = search.best_triangle;
+      fetch_ahead(options.points[state.order.ahead(i)].data());
+      search.begin(options.points[state.order[i]], options.reach);
+      if (i % kProbesAtOnce != 0 && triangle != kNoIndex) {
+        search.body = body;
+        search.settle(triangle);
+      }
+      state.find(options, search, rows_[state.order[i]]);
+    }
+  };
+  scene.threads.for_parts(workers, count, kProbesAtOnce, find);
+  counters_ = {count, 0, 0};
+  for (std::uint32_t i = 0; i < workers; ++i) {
+    counters_.blocks += state.searches[i].blocks;
+    counters_.by_float64 += state.searches[i].by_float64;
+  }
+  return Status::kOk;
+}
+
+Status ClosestQuery::find(Scene& in, const ClosestOptions& options) {
+  static_cast<void>(forget(Status::kOk));
+  SceneState* const scene = in.state();
+  if (scene == nullptr) return Status::kOutOfMemory;
+  Status status = check(*scene, options);
+  if (status == Status::kOk) status = answer(*scene, options);
+  return status == Status::kOk ? status : forget(status);
+}
+
+}  // namespace tandem

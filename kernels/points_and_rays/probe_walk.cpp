@@ -1,0 +1,29 @@
+#include "kernels/points_and_rays/probe_walk.h"
+
+#include "kernels/common/lane_variant.h"
+#include "kernels/points_and_rays/probe_lanes.h"
+#include "kernels/points_and_rays/probe_ways.h"
+
+namespace tandem {
+
+float bound_limit(const FrameLengths& lengths, double distance) {
+  return distance::limit_of(lengths, distance);
+}
+
+float length_limit(const FrameLengths& lengths, double distance) {
+  return rounded_up(distance / lengths.least_in_world);
+}
+
+double world_upper(const FrameLengths& lengths, float length) {
+  return static_cast<double>(length) * lengths.most_in_world;
+}
+
+RayWalk ray_walk(BlockPairVariant variant) {
+  return way_of(variant, RayWalk{ray_walk_by<PlainFour>}, &LaneVariant::ray_walk);
+}
+
+PointWalk point_walk(BlockPairVariant variant) {
+  return way_of(variant, PointWalk{point_walk_by<PlainFour>}, &LaneVariant::point_walk);
+}
+
+}  // namespace tandem

@@ -1,0 +1,52 @@
+#pragma once
+#include <cstdint>
+
+#include "kernels/geometry/local_frame.h"
+#include "tandem/formats/view.h"
+#include "tandem/kernels/detail/buffer.h"
+
+// Walks of one tree by a point or a ray in its frame. They name the triangles that float32 does not rule out.
+namespace tandem {
+
+/// Takes the triangles that a ray may meet, in no order. Result: the parameter, of the local ray, up to which
+/// others count; below 0: none does.
+struct RayTask {
+  const LevelView* tree;
+  LocalRay ray;
+  float limit;  ///< the parameter of the local ray up to which triangles count
+  float (*take)(void* context, std::uint32_t triangle);
+  void* context;
+  std::uint64_t blocks = 0;  ///< that were looked at
+};
+
+/// A triangle whose distance from a point is at least so much, by float32: a length in the body's frame.
+struct ClosestCandidate {
+  float lower;
+  std::uint32_t triangle;
+};
+
+/// A search of a tree for the point that is closest.
+struct PointTask {
+  const LevelView* tree;
+  LocalPoint point;
+  const FrameLengths* lengths;
+  double upper;  ///< what is at least so far away, in the world, does not count; the walk makes it less
+  /// Takes candidates that may be closer than `upper`; makes that less.
+  void (*take)(PointTask& task, const ClosestCandidate* candidates, std::uint32_t count);
+  void* context;
+  std::uint64_t blocks = 0;
+};
+
+using RayWalk = void (*)(RayTask&);
+using PointWalk = void (*)(PointTask&);
+
+// These functions are compiled once for any machine, and called by the variants.
+
+/// The limits of box bounds and of lengths in a body's frame, for a distance in the world.
+float bound_limit(const FrameLengths& lengths, double distance);
+float length_limit(const FrameLengths& lengths, double distance);
+
+/// The distance in the world that a length in a body's frame is at most.
+double world_upper(const FrameLengths& lengths, float length);
+
+}  // namespace tandem

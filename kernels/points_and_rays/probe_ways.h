@@ -1,0 +1,11 @@
+#pragma once
+#include "kernels/common/block_pair.h"
+#include "kernels/points_and_rays/probe_walk.h"
+
+namespace tandem {
+
+/// The named ways, or null where this machine or this build lacks them; all give the same.
+RayWalk ray_walk(BlockPairVariant variant);
+PointWalk point_walk(BlockPairVariant variant);
+
+}  // namespace tandem

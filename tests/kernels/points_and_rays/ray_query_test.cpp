@@ -1,0 +1,329 @@
+#include "tandem/kernels/ray_query.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include "kernels/contact/contact_query_fixture.h"
+#include "kernels/geometry/ray_triangle.h"
+#include "kernels/points_and_rays/probe_ways.h"
+#include "kernels/points_and_rays/ray_oracle.h"
+#include "kernels/points_and_rays/scene_probe.h"
+
+// Rays against rational numbers, and those that are aimed at edges, corners and planes on purpose.
+namespace tandem {
+namespace {
+
+using test::PosedTriangle;
+using Vector = std::array<double, 3>;
+
+struct Rays {
+  std::vector<Vector> origins, directions;
+
+  void add(const Vector& from, const Vector& along) {
+    origins.push_back(from);
+    directions.push_back(along);
+  }
+  RayOptions options(RayHits hits) const {
+    return {.origins = origins, .directions = directions, .hits = hits};
+  }
+};
+
+Vector random_vector(RandomPoses& random, double size) {
+  return {random.symmetric(size), random.symmetric(size), random.symmetric(size)};
+}
+
+/// A point of a triangle: a corner, one of an edge, or of the inside.
+Vector aimed_at(RandomPoses& random, const PosedTriangle& t) {
+  double weight[3] = {random.uniform(0, 1), random.uniform(0, 1), random.uniform(0, 1)};
+  const auto kind = random.below(4);
+  if (kind == 0) weight[1] = weight[2] = 0, weight[0] = 1;
+  if (kind == 1) weight[0] = 0, weight[1] = weight[2] = 0.5;
+  if (kind == 2) weight[random.below(3)] = 0;
+  const double sum = weight[0] + weight[1] + weight[2];
+  Vector out;
+  for (std::size_t k = 0; k < 3; ++k)
+    out[k] = (weight[0] * t[0][k] + weight[1] * t[1][k] + weight[2] * t[2][k]) / sum;
+  return out;
+}
+
+/// Rays that are aimed at triangles, begin on them, lie along their edges, or go anywhere.
+Rays hostile_rays(RandomPoses& random, const std::vector<PosedTriangle>& triangles, double size, int count) {
+  Rays rays;
+  for (int i = 0; i < count; ++i) {
+    const PosedTriangle& t = triangles[random.below(triangles.size())];
+    const PosedTriangle& other = triangles[random.below(triangles.size())];
+    const Vector to = aimed_at(random, t);
+    Vector from = aimed_at(random, other), along;
+    if (random.below(3) != 0) from = random_vector(random, 3 * size);
+    const double length = std::ldexp(1.0, static_cast<int>(random.below(9)) - 4);
+    for (std::size_t k = 0; k < 3; ++k) along[k] = (to[k] - from[k]) * length;
+    const auto kind = random.below(6);
+    if (kind == 0) along = random_vector(random, 1);
+    if (kind == 1) along = {0, 0, 0}, along[random.below(3)] = random.below(2) != 0 ? size : -size;
+    if (kind == 2) {
+      from = t[random.below(3)];
+      for (std::size_t k = 0; k < 3; ++k) along[k] = t[1][k] - t[0][k], from[k] -= along[k] * 2;
+    }
+    if (along == Vector{0, 0, 0}) along[2] = 1;
+    rays.add(from, along);
+  }
+  return rays;
+}
+
+/// All triangles that a ray meets, by the oracle: by ascending parameter, body and triangle.
+struct OracleHit {
+  std::uint32_t body, triangle;
+  RayOracle oracle;
+};
+std::vector<OracleHit> oracle_hits(const Vector& origin, const Vector& direction,
+                                   const std::vector<std::vector<PosedTriangle>>& bodies) {
+  std::vector<OracleHit> hits;
+  for (std::uint32_t body = 0; body < bodies.size(); ++body) {
+    for (std::uint32_t i = 0; i < bodies[body].size(); ++i) {
+      double corner[3][3];
+      for (int c = 0; c < 3; ++c) std::copy_n(bodies[body][i][c].data(), 3, corner[c]);
+      RayOracle oracle(origin.data(), direction.data(), corner);
+      if (oracle.meets()) hits.push_back({body, i, std::move(oracle)});
+    }
+  }
+  std::stable_sort(hits.begin(), hits.end(), [](const OracleHit& x, const OracleHit& y) {
+    return RayOracle::compare(x.oracle, y.oracle) < 0;
+  });
+  return hits;
+}
+
+/// The triangles of all bodies in leaf order.
+std::vector<std::vector<PosedTriangle>> in_leaf_order(const BodyScene& scene) {
+  std::vector<std::vector<PosedTriangle>> out;
+  for (std::uint32_t i = 0; i < scene.instances.size(); ++i) {
+    const std::vector<PosedTriangle> by_face = posed_triangles(scene, i);
+    const LevelView level = scene.assets.views()[scene.instances[i].asset].level();
+    out.emplace_back();
+    for (std::uint32_t t = 0; t < level.triangle_count; ++t)
+      out.back().push_back(by_face[level.triangles[t].source_face()]);
+  }
+  return out;
+}
+
+std::vector<PosedTriangle> all_of(const std::vector<std::vector<PosedTriangle>>& bodies) {
+  std::vector<PosedTriangle> out;
+  for (const auto& body : bodies) out.insert(out.end(), body.begin(), body.end());
+  return out;
+}
+
+double size_of(const std::vector<PosedTriangle>& triangles) {
+  double size = 0;
+  for (const auto& t : triangles) {
+    for (const auto& corner : t) {
+      for (double x : corner) size = std::max(size, std::abs(x));
+    }
+  }
+  return size;
+}
+
+void expect_hit(const RayHit& row, const OracleHit& expected) {
+  EXPECT_EQ(row.body, expected.body);
+  EXPECT_EQ(row.triangle, expected.triangle);
+  EXPECT_TRUE(expected.oracle.is_near(row.t, kRayTimeError)) << row.t;
+  if (expected.oracle.is_plain()) {
+    EXPECT_TRUE(expected.oracle.has_weights(row.weight, kRayWeightError))
+        << row.weight[0] << ' ' << row.weight[1];
+  }
+}
+
+class RayScenes : public testing::TestWithParam<test::SceneFamily> {};
+
+INSTANTIATE_TEST_SUITE_P(All, RayScenes, testing::ValuesIn(test::scene_families()),
+                         [](const auto& test) { return std::string(test.param.name); });
+
+TEST_P(RayScenes, HitsAreThoseOfRationalNumbers) {
+  std::size_t hits_there = 0;
+  for (int trial = 0; trial < test::trials(4, 50) && !HasFailure(); ++trial) {
+    RandomPoses random(91 + static_cast<std::uint64_t>(trial));
+    const BodyScene bodies = GetParam().make(random);
+    const auto triangles = in_leaf_order(bodies);
+    const auto flat = all_of(triangles);
+    if (flat.empty()) continue;
+    const Rays rays = hostile_rays(random, flat, size_of(flat), 60);
+    Scene scene;
+    ASSERT_EQ(scene.set_assets(bodies.assets.views()), Status::kOk);
+    ASSERT_EQ(scene.place(bodies.instances), Status::kOk);
+    RayQuery first, any, all, near;
+    ASSERT_EQ(first.find(scene, rays.options(RayHits::first)), Status::kOk);
+    ASSERT_EQ(any.find(scene, rays.options(RayHits::any)), Status::kOk);
+    ASSERT_EQ(all.find(scene, rays.options(RayHits::all)), Status::kOk);
+    RayOptions to_reach = rays.options(RayHits::first);
+    to_reach.reach = 1;
+    ASSERT_EQ(near.find(scene, to_reach), Status::kOk);
+    std::size_t next = 0;
+    for (std::uint32_t i = 0; i < rays.origins.size() && !HasFailure(); ++i) {
+      SCOPED_TRACE(testing::Message() << "trial " << trial << " ray " << i);
+      const auto expected = oracle_hits(rays.origins[i], rays.directions[i], triangles);
+      hits_there += expected.size();
+      ASSERT_EQ(first.rows()[i].body == kNoIndex, expected.empty());
+      ASSERT_EQ(any.rows()[i].body == kNoIndex, expected.empty());
+      if (!expected.empty()) expect_hit(first.rows()[i], expected[0]);
+      const bool is_near = !expected.empty() && expected[0].oracle.is_at_most(1);
+      EXPECT_EQ(near.rows()[i].body, is_near ? expected[0].body : kNoIndex);
+      for (const OracleHit& hit : expected) {
+        ASSERT_LT(next, all.rows().size());
+        EXPECT_EQ(all.rows()[next].ray, i);
+        expect_hit(all.rows()[next++], hit);
+      }
+    }
+    EXPECT_EQ(next, all.rows().size());
+  }
+  EXPECT_GT(hits_there, 100u);
+}
+
+// A closed surface has no gap: each ray from inside hits it, at the edges and corners too.
+TEST(Rays, NoneSlipsThroughAnEdgeOrACorner) {
+  BodyScene bodies;
+  bodies.assets.add(test::cube(1, 8));
+  bodies.instances.push_back({0, kIdentityPose});
+  RandomPoses random(3);
+  for (int turn = 0; turn < 3; ++turn) {
+    if (turn != 0) bodies.instances[0].pose = test::any_rotation(random);
+    const auto triangles = in_leaf_order(bodies)[0];
+    Rays rays;
+    for (int i = 0; i < test::trials(20000, 20); ++i) {
+      const Vector to = aimed_at(random, triangles[random.below(triangles.size())]);
+      rays.add(random_vector(random, 0.5), {});
+      for (std::size_t k = 0; k < 3; ++k) rays.directions.back()[k] = to[k] - rays.origins.back()[k];
+    }
+    Scene scene;
+    ASSERT_EQ(scene.set_assets(bodies.assets.views()), Status::kOk);
+    ASSERT_EQ(scene.place(bodies.instances), Status::kOk);
+    RayQuery query;
+    ASSERT_EQ(query.find(scene, rays.options(RayHits::first)), Status::kOk);
+    EXPECT_EQ(query.counters().hits, rays.origins.size());
+  }
+}
+
+TEST(Rays, RowsAreTheSameWhateverTheThreadsAndTheLanes) {
+  const BodyScene bodies = crowd(5, 80);
+  const auto flat = all_of(in_leaf_order(bodies));
+  RandomPoses random(8);
+  const Rays rays = hostile_rays(random, flat, size_of(flat), 5000);
+  Scene scene;
+  ASSERT_EQ(scene.set_assets(bodies.assets.views()), Status::kOk);
+  ASSERT_EQ(scene.place(bodies.instances), Status::kOk);
+  for (const RayHits hits : {RayHits::first, RayHits::any, RayHits::all}) {
+    RayQuery alone;
+    ASSERT_EQ(scene.set_threads(1), Status::kOk);
+    ASSERT_EQ(alone.find(scene, rays.options(hits)), Status::kOk);
+    EXPECT_GT(alone.counters().hits, 1000u);
+    for (const std::uint32_t threads : {2u, 3u, 8u}) {
+      RayQuery query;
+      ASSERT_EQ(scene.set_threads(threads), Status::kOk);
+      ASSERT_EQ(query.find(scene, rays.options(hits)), Status::kOk);
+      EXPECT_TRUE(std::ranges::equal(query.rows(), alone.rows()));
+      EXPECT_EQ(query.counters(), alone.counters());
+    }
+  }
+}
+
+TEST(Rays, EveryWayNamesTheSameTriangles) {
+  test::SampleAssets assets;
+  RandomPoses random(4);
+  assets.add(test::soup(random, 300, 0.2));
+  const LevelView level = assets.views()[0].level();
+  const FileHeader& header = *assets.views()[0].header;
+  const LocalFrame frame = local_frame(kIdentityPose, extent_of(level.blocks[0]), header.lower, header.upper);
+  const auto named_by = [&](RayWalk walk, const WorldRay& ray, std::vector<std::uint32_t>& out) {
+    RayTask task;
+    if (local_ray(frame, ray, HUGE_VAL, task.ray) != RayReach::in_frame) return;
+    task.tree = &level;
+    task.limit = task.ray.length;
+    task.context = &out;
+    task.take = [](void* context, std::uint32_t triangle) {
+      static_cast<std::vector<std::uint32_t>*>(context)->push_back(triangle);
+      return HUGE_VALF;
+    };
+    walk(task);
+    out.push_back(static_cast<std::uint32_t>(task.blocks));
+  };
+  for (int i = 0; i < 2000; ++i) {
+    const Vector from = random_vector(random, 2), along = random_vector(random, 1);
+    const WorldRay ray = world_ray(from.data(), along.data(), HUGE_VAL);
+    std::vector<std::uint32_t> plain;
+    named_by(ray_walk(BlockPairVariant::scalar), ray, plain);
+    for (const BlockPairVariant variant : kBlockPairVariants) {
+      if (ray_walk(variant) == nullptr) continue;
+      std::vector<std::uint32_t> named;
+      named_by(ray_walk(variant), ray, named);
+      ASSERT_EQ(named, plain);
+    }
+  }
+}
+
+TEST(Rays, WhatIsNoRayIsNamed) {
+  const BodyScene cubes = row_of_cubes(2);
+  Scene scene;
+  ASSERT_EQ(scene.set_assets(cubes.assets.views()), Status::kOk);
+  ASSERT_EQ(scene.place(cubes.instances), Status::kOk);
+  RayQuery query;
+  Rays rays;
+  rays.add({0, 0, 5}, {0, 0, -1});
+  rays.add({0, 0, 5}, {0, 0, -1});
+  const auto expect = [&](Status status, std::uint64_t where, const RayOptions& options) {
+    EXPECT_EQ(query.find(scene, options), status);
+    EXPECT_EQ(scene.where(), where);
+    EXPECT_TRUE(query.rows().empty());
+  };
+  rays.directions[1] = {0, -0.0, 0};
+  expect(Status::kNoDirection, 1, rays.options(RayHits::first));
+  rays.directions[1] = {0, std::nan(""), 0};
+  expect(Status::kOutOfRange, 1, rays.options(RayHits::first));
+  rays.directions[1] = {0, 0, 1};
+  rays.origins[1] = {0, 0, 2e300};
+  expect(Status::kOutOfRange, 1, rays.options(RayHits::first));
+  rays.origins[1] = {0, 0, 5};
+  RayOptions options = rays.options(static_cast<RayHits>(3));
+  expect(Status::kBadOption, 0, options);
+  options.hits = RayHits::all;
+  options.reach = -1;
+  expect(Status::kBadReach, 0, options);
+  options.reach = std::nan("");
+  expect(Status::kBadReach, 0, options);
+  options.reach = 1;
+  options.directions = options.directions.first(1);
+  expect(Status::kBadOption, 0, options);
+  ASSERT_EQ(query.find(scene, {}), Status::kOk);
+  EXPECT_TRUE(query.rows().empty());
+  ASSERT_EQ(scene.place({}), Status::kOk);
+  ASSERT_EQ(query.find(scene, rays.options(RayHits::first)), Status::kOk);
+  EXPECT_EQ(query.rows()[1].body, kNoIndex);
+  EXPECT_EQ(query.rows()[1].t, HUGE_VAL);
+}
+
+TEST(Rays, ParametersThatFloat64CannotScaleAreRight) {
+  test::SampleAssets assets;
+  assets.add(test::cube(1));
+  Scene scene;
+  ASSERT_EQ(scene.set_assets(assets.views()), Status::kOk);
+  RayQuery query;
+  for (const double size : {1e-300, 1e-310, 5e-324, 1e-30, 1.0, 1e30, 1e300}) {
+    for (const double far : {3.0, 1e20, 1e290}) {
+      const Instance instance = {0, {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, {0, 0, 0}}};
+      ASSERT_EQ(scene.place({&instance, 1}), Status::kOk);
+      Rays rays;
+      rays.add({0.25, 0.125, far}, {0, 0, -size});
+      rays.add({0.25, 0.125, far}, {0, 0, size});
+      ASSERT_EQ(query.find(scene, rays.options(RayHits::first)), Status::kOk);
+      EXPECT_EQ(query.rows()[0].body, 0u) << size << ' ' << far;
+      EXPECT_EQ(query.rows()[1].body, kNoIndex) << size << ' ' << far;
+      const double expected = (far - 1) / size;
+      if (expected < 1e300 && expected > 1e-300) {
+        EXPECT_NEAR(query.rows()[0].t / expected, 1, 1e-11) << size << ' ' << far;
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace tandem

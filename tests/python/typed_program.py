@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 import tandem
+import tandem.gradients
 
 VERTICES: npt.NDArray[np.float64] = np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])
 FACES = [[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1], [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]]
@@ -57,6 +58,8 @@ def ask(scene: tandem.Scene) -> None:
     distances: tandem.Distances = scene.distances(reach=1.0, absolute_tolerance=1e-9, relative_tolerance=1e-9, former=np.zeros(0, tandem.FORMER))
     impacts: tandem.Impacts = scene.impacts(np.zeros(2, tandem.MOTION), 1.0, tolerance=1e-5)
     verdicts: tandem.Verdicts = scene.verdicts(tolerance=0.1, pairs=[[0, 1]])
+    signed: tandem.gradients.SignedDistances = tandem.gradients.signed_distances(scene, pairs=[[0, 1]], reach=1.0)
+    print(signed.pairs["a"], signed.distances["gradient_a"].shape, signed.distances["kind"] == tandem.gradients.OVERLAPPING)
     body: int = scene.add(1, translation=[0.0, 0.0, 0.25], motion=tandem.KINEMATIC, group=1, mask=1)
     scene.move(body, rotation=np.eye(3))
     scene.move(body, rotation=Turn())

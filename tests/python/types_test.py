@@ -25,8 +25,10 @@ def mypy(*words, folder):
 
 def test_mypy_finds_nothing(tmp_path):
     modules = [f"tandem.{path.stem}" for path in PACKAGE.glob("_[a-z]*.py")]
-    done = mypy("-m", "tandem", "-m", "tandem.cuda", "-m", "tandem.jobs", *(("-m", "tandem.dask") if importlib.util.find_spec("distributed") else ()),
-                *(word for module in modules for word in ("-m", module)), folder=tmp_path)
+    public = ["tandem", *(f"tandem.{name}" for name in ("cuda", "gradients", "jax", "jobs", "torch"))]
+    if importlib.util.find_spec("distributed"):
+        public.append("tandem.dask")
+    done = mypy(*(word for module in public + modules for word in ("-m", module)), folder=tmp_path)
     assert done.returncode == 0, done.stdout
     done = mypy(str(PROGRAM), folder=tmp_path)
     assert done.returncode == 0, done.stdout

@@ -138,7 +138,7 @@ static void test_filters(void) {
   tandem_gpu_excluded_pairs* excluded = NULL;
   CHECK_STATUS(tandem_excluded_pairs_create(all, 20, NULL, &cpu_excluded), TANDEM_OK);
   CHECK_STATUS(tandem_gpu_excluded_pairs_create(all, 20, stream, NULL, &excluded), TANDEM_OK);
-  tandem_pair_filter cpu_filter = {sizeof cpu_filter, 0, kBodies, motion, group, mask, cpu_excluded};
+  tandem_pair_filter cpu_filter = {sizeof cpu_filter, 0, kBodies, motion, group, mask, NULL, cpu_excluded};
   uint8_t* gpu_motion = (uint8_t*)to_gpu(motion, sizeof motion);
   uint32_t *gpu_group = (uint32_t*)to_gpu(group, sizeof group),
            *gpu_mask = (uint32_t*)to_gpu(mask, sizeof mask);

@@ -96,7 +96,9 @@ TEST(Configurations, TouchWhereContactsOfTheMovedSceneDoWhateverTheFilterAndTheT
         for (const ConfigurationPair& row : expected) EXPECT_EQ(of_each[row.configuration], 1);
         EXPECT_EQ(query.counters().touching, of_each.size());
         EXPECT_EQ(query.counters().configurations, kConfigurations);
-        if (threads > 1) EXPECT_EQ(query.counters(), counted);
+        if (threads > 1) {
+          EXPECT_EQ(query.counters(), counted);
+        }
         counted = query.counters();
         touching += of_each.size();
         free += kConfigurations - of_each.size();

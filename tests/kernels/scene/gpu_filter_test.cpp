@@ -157,7 +157,8 @@ TEST_F(GpuFilterTest, FewOrManyAreKept) {
                       std::to_string(count) + " " + std::to_string(rare) + " " + std::to_string(few_fixed));
       }
     }
-    expect_as_cpu(broad_phase, boxes, {std::vector<Motion>(count, Motion::fixed), {}, {}, {}}, true, "all");
+    expect_as_cpu(broad_phase, boxes, {std::vector<Motion>(count, Motion::fixed), {}, {}, {}, {}}, true,
+                  "all");
   }
 }
 

@@ -35,6 +35,26 @@ def test_answers_are_those_of_assets_built_of_the_positions(scene, box, kind):
     assert most > 0
 
 
+def test_points_rays_and_configurations_see_the_positions(scene, box):
+    numbers = np.random.default_rng(2)
+    points, along = numbers.normal(size=(300, 3)) * 2, numbers.normal(size=(300, 3))
+    hits = 0
+    for _ in range(20):
+        bent = (BOX_VERTICES + numbers.normal(scale=0.2, size=BOX_VERTICES.shape)).astype(np.float32)
+        scene.deform(1, bent)
+        anew = tandem.Scene([box, tandem.build(bent, BOX_FACES)], scene.instances)
+        x, y = scene.closest(points, sides=True), anew.closest(points, sides=True)
+        assert (x["lower"] <= y["upper"]).all() and (y["lower"] <= x["upper"]).all()
+        assert np.array_equal(x["winding"], y["winding"]) and np.array_equal(x["within"], y["within"])
+        x, y = scene.rays(points, along), anew.rays(points, along)
+        assert np.array_equal(x[["body", "face"]], y[["body", "face"]])
+        assert np.allclose(x["t"], y["t"], rtol=1e-9)
+        hits += np.isfinite(x["t"]).sum()
+        places = numbers.normal(scale=1.5, size=(40, 1, 3))
+        assert np.array_equal(scene.configurations([1], translation=places).touching, anew.configurations([1], translation=places).touching)
+    assert hits > 200
+
+
 def test_float64_positions_are_decided_as_they_are(scene):
     assert len(scene.contacts().contacts) == 0
     top = BOX_VERTICES[:, 2].max()

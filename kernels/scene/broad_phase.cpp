@@ -134,9 +134,7 @@ bool BroadPhase::halve(Item* all, const PairFilter& filter, Range& range, Range&
   Item* const items = all + range.begin;
   const std::size_t count = range.count;
   double lo[3] = {kInfinity, kInfinity, kInfinity}, hi[3] = {-kInfinity, -kInfinity, -kInfinity};
-  bool one_world = true;
   for (std::size_t i = 0; i < count; ++i) {
-    one_world = one_world && items[i].world == items[0].world;
     for (int k = 0; k < 3; ++k) {
       const double c = items[i].centre[k];
       lo[k] = c < lo[k] ? c : lo[k];
@@ -148,7 +146,8 @@ bool BroadPhase::halve(Item* all, const PairFilter& filter, Range& range, Range&
     if (hi[k] - lo[k] > hi[axis] - lo[axis]) axis = k;
   }
   const std::size_t left_units = (range.units + 1) / 2, left = left_units * range.unit;
-  if (!one_world) {
+  const auto of_first = [&](const Item& item) { return item.world == items[0].world; };
+  if (filter.world != nullptr && !std::all_of(items, items + count, of_first)) {
     std::nth_element(items, items + left, items + count,
                      [](const Item& x, const Item& y) { return x.world < y.world; });
   } else if (tells_apart(filter) && !(hi[axis] > lo[axis])) {

@@ -15,13 +15,6 @@ PairTask first_contact_task(const PosedTree& a, const PosedTree& b, double withi
   return task;
 }
 
-bool run_contact_task(const PairTask& task, NarrowPhase way, ContactSink& sink,
-                      Buffer<NearBlockPair>& waiting) {
-  sink.gave_up = false;
-  const bool enough_memory = (task.in_frame ? way : narrow_phase_by_world_boxes)(task, sink);
-  return sink.gave_up ? find_first_within(task, sink, waiting) : enough_memory;
-}
-
 bool FirstContact::grow(ContactSink& sink) {
   Buffer<Contact>& contacts = static_cast<FirstContact*>(sink.owner)->contacts_;
   const auto used = static_cast<std::size_t>(sink.next - contacts.data());

@@ -29,7 +29,11 @@ PairTask first_contact_task(const PosedTree& a, const PosedTree& b, double withi
 
 /// Does such a task, or any other of two posed trees, by the named way where it is in_frame. False: out of
 /// memory.
-bool run_contact_task(const PairTask& task, NarrowPhase way, ContactSink& sink,
-                      Buffer<NearBlockPair>& waiting);
+inline bool run_contact_task(const PairTask& task, NarrowPhase way, ContactSink& sink,
+                             Buffer<NearBlockPair>& waiting) {
+  sink.gave_up = false;
+  const bool enough_memory = (task.in_frame ? way : narrow_phase_by_world_boxes)(task, sink);
+  return sink.gave_up ? find_first_within(task, sink, waiting) : enough_memory;
+}
 
 }  // namespace tandem

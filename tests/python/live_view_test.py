@@ -166,11 +166,11 @@ def test_the_command_simulates(falling_file, box, tmp_path):
 
 @pytest.fixture
 def display(monkeypatch):
-    """A display that nobody sees."""
+    """A display that nobody sees. It stays as it is when a program that looked at it has gone: the next one would find none for a moment."""
     if shutil.which("Xvfb") is None:
         pytest.skip("a window needs Xvfb here")
     reading, writing = os.pipe()
-    with subprocess.Popen(["Xvfb", "-displayfd", str(writing), "-screen", "0", "800x600x24", "-nolisten", "tcp"], pass_fds=[writing], stderr=subprocess.DEVNULL) as server:
+    with subprocess.Popen(["Xvfb", "-displayfd", str(writing), "-screen", "0", "800x600x24", "-nolisten", "tcp", "-noreset"], pass_fds=[writing], stderr=subprocess.DEVNULL) as server:
         os.close(writing)
         with os.fdopen(reading) as number:
             monkeypatch.setenv("DISPLAY", ":" + number.readline().strip())

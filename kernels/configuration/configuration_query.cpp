@@ -13,7 +13,7 @@ namespace {
 // Configurations that a worker takes at a time.
 constexpr std::size_t kConfigurationsAtOnce = 16;
 
-// Two of the bodies that move, by their places in the list.
+// This names two of the bodies that move, by their places in the list.
 struct MovingPair {
   std::uint32_t a, b;
 };
@@ -82,7 +82,7 @@ Status ConfigurationQuery::State::check_bodies(SceneState& scene, std::span<cons
   return Status::kOk;
 }
 
-// What holds in all configurations: which of the bodies that move the filter looks at, and a tree of those
+// Prepares what holds in all configurations: which of the bodies that move the filter looks at, and a tree of those
 // that stand, which is kept while the scene stays as it is. Removed bodies have a box that meets nothing. The
 // caller may change the table of excluded pairs in its place, so that is asked in every call.
 Status ConfigurationQuery::State::prepare(const SceneState& scene, const ConfigurationOptions& options) {

@@ -66,7 +66,7 @@ BroadPhase::Kind BroadPhase::kind_of(const PairFilter& filter, std::size_t box) 
           WorldRange::of(filter.world != nullptr ? filter.world[box] : 0)};
 }
 
-// Of boxes of one world.
+// Orders kinds of boxes that are in one world.
 bool BoxTree::Kind::before(const Kind& other) const {
   const auto order = [](const Kind& k) { return std::tie(k.group, k.mask, k.motions, k.met); };
   return order(*this) < order(other);

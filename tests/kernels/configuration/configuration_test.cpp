@@ -40,7 +40,7 @@ struct Question {
   ConfigurationOptions options() const { return {.bodies = bodies, .poses = poses}; }
 };
 
-// By moving the bodies and asking for contacts, one configuration after the other.
+// Finds the rows by moving the bodies and asking for contacts, one configuration after the other.
 Rows by_contacts(const Question& question, const PairFilter& filter, double within) {
   Scene scene;
   EXPECT_EQ(scene.set_assets(question.scene.assets.views()), Status::kOk);

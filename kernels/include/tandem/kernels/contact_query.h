@@ -14,7 +14,7 @@ enum class QueryMode : std::uint8_t {
 };
 
 /// Two triangles that meet: triangle_a belongs to instance pairs()[pair].a, triangle_b to pairs()[pair].b.
-/// Two triangles that meet. In a pair of an instance with itself either of them may be a.
+/// In a pair of an instance with itself either of them may be a.
 struct Contact {
   std::uint32_t pair;
   std::uint32_t triangle_a, triangle_b;  ///< in leaf order: LevelView::triangles[triangle_a]

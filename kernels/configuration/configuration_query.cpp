@@ -82,9 +82,9 @@ Status ConfigurationQuery::State::check_bodies(SceneState& scene, std::span<cons
   return Status::kOk;
 }
 
-// Prepares what holds in all configurations: which of the bodies that move the filter looks at, and a tree of those
-// that stand, which is kept while the scene stays as it is. Removed bodies have a box that meets nothing. The
-// caller may change the table of excluded pairs in its place, so that is asked in every call.
+// Prepares what holds in all configurations: which of the bodies that move the filter looks at, and a tree of
+// those that stand, which is kept while the scene stays as it is. Removed bodies have a box that meets
+// nothing. The caller may change the table of excluded pairs in its place, so that is asked in every call.
 Status ConfigurationQuery::State::prepare(const SceneState& scene, const ConfigurationOptions& options) {
   filter = scene.filter();
   moving_pairs.clear();

@@ -152,7 +152,9 @@ bool ConfigurationQuery::State::meet(const SceneState& scene, const Configuratio
   }
   for (std::uint32_t i = 0; i < bodies.size(); ++i) {
     const WorldBox& box = worker.boxes[i];
-    standing.visit_kept(box, [&](std::uint32_t other) {
+    if (standing.kept_of() == 0) continue;
+    standing.kept().visit(box, [&](std::size_t place) {
+      const std::uint32_t other = standing.kept().items[place].box;
       if (filter.looks_at(bodies[i], other))
         add(worker.trees[i], scene.bodies[other], {bodies[i], other}, depth_of(box, scene.boxes[other]));
     });

@@ -39,7 +39,7 @@ class ProbedBodies {
   /// are passed over; visit(body) may make that less.
   template <typename Bound, typename Visit>
   void visit(const Bound& bound, const double& limit, const Visit& visit) const {
-    const BoxTree& tree = boxes_.tree();
+    const BoxTree& tree = boxes_;
     if (tree.items.size() == 0) return;
     struct Entry {
       double bound;
@@ -76,7 +76,7 @@ class ProbedBodies {
   std::uint64_t assets_id_ = 0, shapes_id_ = 0, version_ = 0;  // of what this is made
   Buffer<LocalFrame> frames_;
   WorldBox bounds_;
-  BroadPhase boxes_;
+  BoxTree boxes_;
 };
 
 /// Has the machine load what is read soon.

@@ -59,7 +59,7 @@ bool BoxTree::reserve(std::size_t boxes, const PairFilter& filter) {
   return items.resize(boxes) && groups.resize(total) && kinds.resize(tells_apart(filter) ? total : 0);
 }
 
-BroadPhase::Kind BroadPhase::kind_of(const PairFilter& filter, std::size_t box) {
+BoxTree::Kind BoxTree::Kind::of(const PairFilter& filter, std::size_t box) {
   const Motion motion = filter.motion != nullptr ? filter.motion[box] : Motion::moving;
   return {filter.group != nullptr ? filter.group[box] : ~0u, filter.mask != nullptr ? filter.mask[box] : ~0u,
           1u << (static_cast<std::uint32_t>(motion) & 3), motions_that_meet(motion),
@@ -152,7 +152,7 @@ bool BroadPhase::halve(Item* all, const PairFilter& filter, Range& range, Range&
                      [](const Item& x, const Item& y) { return x.world < y.world; });
   } else if (tells_apart(filter) && !(hi[axis] > lo[axis])) {
     std::nth_element(items, items + left, items + count, [&](const Item& x, const Item& y) {
-      return kind_of(filter, x.box).before(kind_of(filter, y.box));
+      return Kind::of(filter, x.box).before(Kind::of(filter, y.box));
     });
   } else {
     std::nth_element(items, items + left, items + count,
@@ -230,7 +230,7 @@ void BroadPhase::build_kinds(int level, std::size_t below, const PairFilter& fil
   const auto fill = [&](std::size_t first, std::size_t last, std::uint32_t) {
     for (std::size_t i = first * kGroup; i < last * kGroup; ++i) {
       Kind kind;
-      if (i < below && level == 0) kind = kind_of(filter, tree.items[i].box);
+      if (i < below && level == 0) kind = Kind::of(filter, tree.items[i].box);
       if (i < below && level > 0) {
         for (const Kind& child : tree.kinds[tree.level_begin[level - 1] + i].of) kind.add(child);
       }
@@ -464,13 +464,13 @@ Status BroadPhase::keep_fixed(std::span<const WorldBox> boxes, std::span<const M
   return Status::kOk;
 }
 
-Status BroadPhase::make_tree(std::span<const WorldBox> boxes, WorkerThreads& threads, std::uint32_t workers) {
+Status BroadPhase::make_tree(std::span<const WorldBox> boxes, const PairFilter& filter,
+                             WorkerThreads& threads, std::uint32_t workers, BoxTree& tree) {
   const Team team = {threads, workers};
-  pairs_.clear();
   if (boxes.size() >= kNoIndex) return Status::kTooManyInstances;
-  if (!tree_.reserve(boxes.size(), {})) return Status::kOutOfMemory;
-  if (!take(boxes, nullptr, nullptr, tree_, team)) return Status::kOutOfRange;
-  if (!boxes.empty()) build(boxes, {}, tree_, team);
+  if (!tree.reserve(boxes.size(), filter)) return Status::kOutOfMemory;
+  if (!take(boxes, filter.world, nullptr, tree, team)) return Status::kOutOfRange;
+  if (!boxes.empty()) build(boxes, filter, tree, team);
   return Status::kOk;
 }
 

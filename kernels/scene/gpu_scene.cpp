@@ -261,11 +261,11 @@ class Gpu final : public SceneDevice {
     if (status == Status::kOk) status = excluded_.upload(filter.excluded, kStream);
     filter_ = {};
     filter_.excluded = excluded_.view();
-    if (status == Status::kOk) status = upload(scene.motion, motion_on_gpu_, filter_.motion);
+    if (status == Status::kOk) status = upload(scene.columns.motion, motion_on_gpu_, filter_.motion);
     if (status == Status::kOk)
-      status = upload(any_removed ? group_ : scene.group, group_on_gpu_, filter_.group);
-    if (status == Status::kOk) status = upload(any_removed ? mask_ : scene.mask, mask_on_gpu_, filter_.mask);
-    if (status == Status::kOk) status = upload(scene.world, world_on_gpu_, filter_.world);
+      status = upload(any_removed ? group_ : scene.columns.group, group_on_gpu_, filter_.group);
+    if (status == Status::kOk) status = upload(any_removed ? mask_ : scene.columns.mask, mask_on_gpu_, filter_.mask);
+    if (status == Status::kOk) status = upload(scene.columns.world, world_on_gpu_, filter_.world);
     if (status == Status::kOk) status = wait();
     if (status == Status::kOk) version_ = scene.version;
     return status;
@@ -335,15 +335,15 @@ class Gpu final : public SceneDevice {
   }
 
   Status keep_fixed(SceneState& scene, bool& fixed_kept) {
-    const Motion* const begin = scene.motion.data();
+    const Motion* const begin = scene.columns.motion.data();
     const bool any_fixed =
-        std::find(begin, begin + scene.motion.size(), Motion::fixed) != begin + scene.motion.size();
+        std::find(begin, begin + scene.columns.motion.size(), Motion::fixed) != begin + scene.columns.motion.size();
     if (any_fixed ? fixed_kept : !keeps_fixed_) return Status::kOk;
     Buffer<Motion> all_moving;
     if (!any_fixed && !all_moving.resize(instances_.count)) return Status::kOutOfMemory;
     std::fill_n(all_moving.data(), all_moving.size(), Motion::moving);
     const Status status = broad_phase_.keep_fixed(
-        instances_, bounds(), (any_fixed ? scene.motion : all_moving).view(), filter_.world, kStream);
+        instances_, bounds(), (any_fixed ? scene.columns.motion : all_moving).view(), filter_.world, kStream);
     keeps_fixed_ = any_fixed;
     fixed_kept = any_fixed && status == Status::kOk;
     return status;

@@ -9,6 +9,8 @@
 #include "kernels/common/worker_threads.h"
 #include "kernels/geometry/relative_pose.h"
 #include "kernels/refit/deformed_tree.h"
+#include "kernels/scene/dynamic_box_tree.h"
+#include "kernels/scene/filter_columns.h"
 #include "kernels/scene/near_pairs.h"
 #include "kernels/scene/scene_device.h"
 #include "tandem/kernels/broad_phase.h"
@@ -80,8 +82,7 @@ struct SceneState : Allocated {
   Buffer<Instance> instances;
   Buffer<PosedTree> bodies;
   Buffer<WorldBox> boxes;
-  Buffer<Motion> motion;  // this and the next three: empty where the filter has none
-  Buffer<std::uint32_t> group, mask, world;
+  FilterColumns columns;
   ExcludedPairs excluded;
 
   WorkerThreads threads;
@@ -107,6 +108,9 @@ struct SceneState : Allocated {
   }
 
   bool is_body(std::uint32_t i) const { return i < instances.size() && instances[i].asset != kNoIndex; }
+  bool is_fixed(std::uint32_t i) const {
+    return i < columns.motion.size() && columns.motion[i] == Motion::fixed;
+  }
   /// An instance as the walks of trees see it, and its world box. Result: kOk, kUnknownAsset, kPoseNotRigid
   /// or kOutOfRange.
   Status posed(const Instance& instance, PosedTree& tree, WorldBox& box) const;
@@ -163,12 +167,12 @@ struct SceneState : Allocated {
   Status pose_all(std::span<const Instance> placed, bool some_stand);
   void note_change(std::uint32_t body);
   Status set_filter(const PairFilter& filter);
-  template <typename Entry>
-  bool copy_entries(const Entry* from, Buffer<Entry>& to);
-  template <typename Entry>
-  bool add_entry(Entry entry, Entry usual, Buffer<Entry>& to, std::uint32_t body, std::size_t count);
   Status find_pairs(double reach, bool self_pairs);
   Status keep_fixed_bodies();
+  /// Calls visit(body) for each that changed since pairs were found, ascending.
+  template <typename Visit>
+  void each_changed(const Visit& visit) const;
+  bool few_changed() const;
   Status search_all();
   std::span<const WorldBox> asked_boxes() const {
     return (found_of_.reach > 0 ? reach_boxes_ : boxes).view();
@@ -177,6 +181,9 @@ struct SceneState : Allocated {
   Status take_near_pairs();
   Status search_by_device();
   Status search_changed();
+  Status follow_changed();
+  template <typename Visit>
+  void each_near(std::uint32_t body, const Visit& visit) const;
   WorldBox box_within_reach(std::uint32_t body) const;
   bool widen_boxes();
 
@@ -188,6 +195,8 @@ struct SceneState : Allocated {
   FoundPairs found_of_;
   Buffer<std::uint8_t> changed_;  // of each body: since pairs were found
   std::size_t changed_count_ = 0;
+  DynamicBoxTree tree_;  // of asked_boxes(), where few change again and again
+  std::size_t searched_alone_ = 0;  // bodies that were tested against all since there was a tree
   bool any_fixed_ = false;
   bool fixed_kept_ = false;  // the broad phase has a tree of the fixed bodies as they stand
   std::uint32_t removed_ = 0;

@@ -51,11 +51,10 @@ class BroadPhase {
 
   void forget_fixed();
 
-  /// Makes the tree of all boxes, for walks of it. Result: as of find_pairs(). Condition: none are kept.
-  Status make_tree(std::span<const WorldBox> boxes, WorkerThreads& threads, std::uint32_t workers);
-
-  /// The tree that make_tree() made; valid until the next call. It has no groups where there are no boxes.
-  const BoxTree& tree() const { return tree_; }
+  /// Makes a tree of all boxes, whose kinds are those of the filter. It has no groups where there are no
+  /// boxes. Result: as of find_pairs(); after an error the tree is of no use.
+  static Status make_tree(std::span<const WorldBox> boxes, const PairFilter& filter, WorkerThreads& threads,
+                          std::uint32_t workers, BoxTree& tree);
 
   /// Returns the number of boxes whose fixed ones are kept, 0 where none are.
   std::size_t kept_of() const { return kept_of_; }
@@ -67,9 +66,8 @@ class BroadPhase {
     return kept_of_ == 0 ? static_cast<std::uint32_t>(i) : free_[i];
   }
 
-  /// Calls visit(number) for each kept box that meets this one, whatever its world.
-  template <typename Visit>
-  void visit_kept(const WorldBox& box, const Visit& visit) const;
+  /// The tree of the kept boxes. Condition: some are kept.
+  const BoxTree& kept() const { return kept_; }
 
   /// The pairs of the last call that returned kOk; valid until the next call.
   std::span<const ObjectPair> pairs() const { return pairs_.view(); }
@@ -121,9 +119,8 @@ class BroadPhase {
   bool provide_finders(std::uint32_t workers);
   static std::uint32_t meeting(const Group& a, const Group& b);
   static std::uint32_t meeting(const TreePair& trees, const GroupPair& pair);
-  static Kind kind_of(const PairFilter& filter, std::size_t box);
   static std::uint32_t may_look(const TreePair& trees, const GroupPair& pair);
-  bool take(std::span<const WorldBox> boxes, const std::uint32_t* world, const std::uint32_t* numbers,
+  static bool take(std::span<const WorldBox> boxes, const std::uint32_t* world, const std::uint32_t* numbers,
             Tree& tree, Team team);
   static bool halve(Item* all, const PairFilter& filter, Range& range, Range& right);
   static void split(Item* all, const PairFilter& filter, Range range);
@@ -148,28 +145,5 @@ class BroadPhase {
   Buffer<ObjectPair> pairs_;
   Buffer<std::uint32_t> first_;  // where the pairs of each run of numbers begin
 };
-
-template <typename Visit>
-void BroadPhase::visit_kept(const WorldBox& box, const Visit& visit) const {
-  if (kept_of_ == 0) return;
-  // Each group taken off puts at most four of the level below on, of which three wait at most.
-  struct Waiting {
-    std::uint32_t group;
-    int level;
-  } stack[(kGroup - 1) * 17 + 1];
-  int height = 0;
-  stack[height++] = {0, kept_.top()};
-  while (height > 0) {
-    const Waiting at = stack[--height];
-    const Group& group = kept_.level(at.level)[at.group];
-    for (std::uint32_t i = 0; i < kGroup; ++i) {
-      bool meets = true;
-      for (int k = 0; k < 3; ++k) meets = meets && group.lo[k][i] <= box.hi[k] && box.lo[k] <= group.hi[k][i];
-      const std::uint32_t below = at.group * kGroup + i;
-      if (meets && at.level == 0) visit(kept_.items[below].box);
-      if (meets && at.level > 0) stack[height++] = {below, at.level - 1};
-    }
-  }
-}
 
 }  // namespace tandem

@@ -1,6 +1,7 @@
 #pragma once
 #include <cstddef>
 #include <cstdint>
+#include <iterator>
 
 #include "tandem/kernels/detail/buffer.h"
 #include "tandem/kernels/pair_filter.h"
@@ -29,6 +30,7 @@ struct BoxTree {
     std::uint32_t group = 0, mask = 0, motions = 0, met = 0;
     WorldRange worlds;
 
+    static Kind of(const PairFilter& filter, std::size_t box);
     bool before(const Kind& other) const;
     void add(const Kind& more);
     bool may_look_at(const Kind& other) const;
@@ -44,9 +46,50 @@ struct BoxTree {
   int levels = 0;
 
   bool reserve(std::size_t boxes, const PairFilter& filter);
+  void clear() {
+    items.clear(), groups.clear(), kinds.clear();
+    levels = 0;
+  }
   int top() const { return levels - 1; }
   const Group* level(int i) const { return groups.data() + level_begin[i]; }
   const Kinds* kinds_of(int i) const { return kinds.data() + level_begin[i]; }
+
+  /// Calls visit(place) for each item whose box meets this one; `items` says which box is in a place. kind:
+  /// where it is given, items may be left out at which the filter does not look from there.
+  template <typename Visit>
+  void visit(const WorldBox& box, const Kind* kind, const Visit& visit) const;
+  template <typename Visit>
+  void visit(const WorldBox& box, const Visit& each) const {
+    visit(box, nullptr, each);
+  }
 };
+
+template <typename Visit>
+void BoxTree::visit(const WorldBox& box, const Kind* kind, const Visit& visit) const {
+  if (items.size() == 0) return;
+  // Each group taken off puts at most four of the level below on, of which three wait at most.
+  struct Waiting {
+    std::size_t group;
+    int level;
+  } stack[(kGroup - 1) * std::size(BoxTree{}.level_begin) + 1];
+  int height = 0;
+  stack[height++] = {0, top()};
+  while (height > 0) {
+    const Waiting at = stack[--height];
+    const Group& group = level(at.level)[at.group];
+    for (std::size_t i = 0; i < kGroup; ++i) {
+      bool meets = true;
+      for (int k = 0; k < 3; ++k) meets = meets && group.lo[k][i] <= box.hi[k] && box.lo[k] <= group.hi[k][i];
+      if (!meets) continue;
+      if (kind != nullptr && kinds.size() != 0 && !kind->may_look_at(kinds_of(at.level)[at.group].of[i]))
+        continue;
+      if (at.level == 0) {
+        visit(kGroup * at.group + i);
+      } else {
+        stack[height++] = {kGroup * at.group + i, at.level - 1};
+      }
+    }
+  }
+}
 
 }  // namespace tandem

@@ -38,7 +38,7 @@ class Robot:
         self.assets = [tandem.build(*mesh) for mesh in self.meshes]
         self.scene = tandem.Scene(self.assets)
         self._place()
-        at_rest = self.scene.configurations(np.arange(len(joints)), transform=self.poses([pinocchio.neutral(self.model)]), all_pairs=True).pairs
+        at_rest = self.scene.configurations(np.arange(len(joints)), transform=self.poses([pinocchio.neutral(self.model)]), pairs="all").pairs
         self.excluded += [(a, b) for _, a, b in at_rest.tolist() if b < len(joints)]
         self._place()
 

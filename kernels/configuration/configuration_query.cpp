@@ -5,6 +5,7 @@
 
 #include "kernels/common/check_options.h"
 #include "kernels/contact/first_contact.h"
+#include "kernels/distance/pair_distance.h"
 #include "kernels/scene/scene_state.h"
 
 namespace tandem {
@@ -25,18 +26,29 @@ struct SceneVersion {
   bool operator==(const SceneVersion&) const = default;
 };
 
-// A pair whose boxes meet, and how far these reach into each other in their shallowest direction.
-struct Meeting {
+// A pair that is to be decided, and how near its boxes are: less than 0, as far as they reach into each other
+// in their shallowest direction.
+struct Candidate {
   const PosedTree *a, *b;
   ObjectPair bodies;
-  double depth;
+  double gap;
 };
 
-double depth_of(const WorldBox& a, const WorldBox& b) {
-  double depth = std::min(a.hi[0], b.hi[0]) - std::max(a.lo[0], b.lo[0]);
-  for (int k = 1; k < 3; ++k)
-    depth = std::min(depth, std::min(a.hi[k], b.hi[k]) - std::max(a.lo[k], b.lo[k]));
-  return depth;
+double gap_of(const WorldBox& a, const WorldBox& b) {
+  double gap = -INFINITY;
+  for (int k = 0; k < 3; ++k) gap = std::max({gap, a.lo[k] - b.hi[k], b.lo[k] - a.hi[k]});
+  return gap;
+}
+
+Candidate candidate_of(const PosedTree& a, const PosedTree& b, const ObjectPair& bodies, double gap) {
+  const bool in_order = bodies.a < bodies.b;
+  return {in_order ? &a : &b, in_order ? &b : &a,
+          {std::min(bodies.a, bodies.b), std::max(bodies.a, bodies.b)}, gap};
+}
+
+void sort_by_gap(Buffer<Candidate>& candidates) {
+  std::sort(candidates.data(), candidates.data() + candidates.size(),
+            [](const Candidate& x, const Candidate& y) { return x.gap != y.gap ? x.gap < y.gap : x.bodies < y.bodies; });
 }
 
 }  // namespace
@@ -45,8 +57,11 @@ struct ConfigurationQuery::State : Allocated {
   struct Worker {
     Buffer<PosedTree> trees;  // of the bodies that move, in this configuration
     Buffer<WorldBox> boxes;   // larger by the clearance
-    Buffer<Meeting> meetings;
+    Buffer<Candidate> candidates;
     FirstContact first_contact;
+    DistanceSearch search;
+    ConfigurationPair nearest;  // of the last configuration
+    NearestTriangles triangles;     // of `nearest`
     Buffer<ConfigurationPair> found;
     ConfigurationCounters counters;
     bool enough_memory = true;
@@ -60,7 +75,13 @@ struct ConfigurationQuery::State : Allocated {
   bool pose(const SceneState& scene, const ConfigurationOptions& options, std::size_t configuration,
             Worker& worker);
   bool meet(const SceneState& scene, const ConfigurationOptions& options, Worker& worker) const;
+  void decide(const ConfigurationOptions& options, std::size_t configuration, Worker& worker) const;
+  void find_nearest(const SceneState& scene, const ConfigurationOptions& options, std::size_t configuration,
+                    Worker& worker) const;
+  void bound(const ConfigurationOptions& options, const Candidate& candidate, const NearestTriangles& former,
+             Worker& worker) const;
 
+  NearestPhase nearest_phase = best_way(tandem::nearest_phase);
   PairFilter filter;
   Buffer<std::uint8_t> moves;  // of each body of the scene
   Buffer<MovingPair> moving_pairs;
@@ -125,7 +146,8 @@ bool ConfigurationQuery::State::pose(const SceneState& scene, const Configuratio
       }
       return false;
     }
-    worker.boxes[i] = options.within > 0 ? grown(box, options.within) : box;
+    const bool grow = options.find != ConfigurationPairs::nearest && options.within > 0;
+    worker.boxes[i] = grow ? grown(box, options.within) : box;
   }
   return true;
 }
@@ -135,55 +157,120 @@ bool ConfigurationQuery::State::pose(const SceneState& scene, const Configuratio
 bool ConfigurationQuery::State::meet(const SceneState& scene, const ConfigurationOptions& options,
                                      Worker& worker) const {
   const std::span<const std::uint32_t> bodies = options.bodies;
-  worker.meetings.clear();
+  worker.candidates.clear();
   bool enough_memory = true;
-  const auto add = [&](const PosedTree& a, const PosedTree& b, const ObjectPair& pair, double depth) {
-    const bool in_order = pair.a < pair.b;
-    enough_memory =
-        enough_memory && worker.meetings.push({in_order ? &a : &b,
-                                               in_order ? &b : &a,
-                                               {std::min(pair.a, pair.b), std::max(pair.a, pair.b)},
-                                               depth});
-  };
   for (const MovingPair& pair : moving_pairs.view()) {
     const WorldBox &a = worker.boxes[pair.a], &b = worker.boxes[pair.b];
-    if (overlap(a, b))
-      add(worker.trees[pair.a], worker.trees[pair.b], {bodies[pair.a], bodies[pair.b]}, depth_of(a, b));
+    if (!overlap(a, b)) continue;
+    enough_memory = enough_memory &&
+                    worker.candidates.push(candidate_of(worker.trees[pair.a], worker.trees[pair.b],
+                                                        {bodies[pair.a], bodies[pair.b]}, gap_of(a, b)));
   }
-  for (std::uint32_t i = 0; i < bodies.size(); ++i) {
+  for (std::uint32_t i = 0; i < bodies.size() && standing.kept_of() != 0; ++i) {
     const WorldBox& box = worker.boxes[i];
-    if (standing.kept_of() == 0) continue;
     standing.kept().visit(box, [&](std::size_t place) {
       const std::uint32_t other = standing.kept().items[place].box;
-      if (filter.looks_at(bodies[i], other))
-        add(worker.trees[i], scene.bodies[other], {bodies[i], other}, depth_of(box, scene.boxes[other]));
+      if (!filter.looks_at(bodies[i], other)) return;
+      enough_memory = enough_memory &&
+                      worker.candidates.push(candidate_of(worker.trees[i], scene.bodies[other],
+                                                          {bodies[i], other}, gap_of(box, scene.boxes[other])));
     });
   }
-  std::sort(worker.meetings.data(), worker.meetings.data() + worker.meetings.size(),
-            [](const Meeting& x, const Meeting& y) {
-              return x.depth != y.depth ? x.depth > y.depth : x.bodies < y.bodies;
-            });
+  sort_by_gap(worker.candidates);
   return enough_memory;
+}
+
+void ConfigurationQuery::State::decide(const ConfigurationOptions& options, std::size_t configuration,
+                                       Worker& worker) const {
+  bool touching = false;
+  for (const Candidate& candidate : worker.candidates.view()) {
+    if (!worker.enough_memory) return;
+    bool touch = false;
+    ++worker.counters.object_pairs;
+    worker.enough_memory = worker.first_contact.find(*candidate.a, *candidate.b, options.within, touch);
+    if (!touch) continue;
+    touching = true;
+    worker.enough_memory = worker.enough_memory && worker.found.push({configuration, candidate.bodies.a,
+                                                                      candidate.bodies.b, 0, options.within});
+    if (options.find == ConfigurationPairs::first) break;
+  }
+  worker.counters.touching += touching;
+}
+
+// Bounds the distance of a pair, unless it is farther than the nearest so far. What is passed over is not
+// nearer than `upper` was then, and so not than the least upper bound in the end.
+void ConfigurationQuery::State::bound(const ConfigurationOptions& options, const Candidate& candidate,
+                                      const NearestTriangles& former, Worker& worker) const {
+  ConfigurationPair& nearest = worker.nearest;
+  const double reach = std::min(options.within, nearest.upper);
+  const NearestTask task = nearest_task(*candidate.a, *candidate.b, options.tolerance);
+  const ObjectDistance distance = worker.search.find(task, reach, former, nearest_phase);
+  worker.enough_memory = worker.search.found.enough_memory;
+  ++worker.counters.object_pairs;
+  nearest.lower = std::min(nearest.lower, distance.lower);
+  if (distance.upper >= nearest.upper) return;
+  nearest.a = candidate.bodies.a;
+  nearest.b = candidate.bodies.b;
+  nearest.upper = distance.upper;
+  worker.triangles = {distance.triangle_a, distance.triangle_b};
+}
+
+// Looks at the nearest boxes first, of pairs of moving bodies and then of those with one that stands. What was
+// nearest in the configuration before comes first of all, as this is mostly like it; but not from one part of
+// the configurations to the next, so that no result depends on the number of threads.
+void ConfigurationQuery::State::find_nearest(const SceneState& scene, const ConfigurationOptions& options,
+                                             std::size_t configuration, Worker& worker) const {
+  const std::span<const std::uint32_t> bodies = options.bodies;
+  ConfigurationPair& nearest = worker.nearest;
+  if (configuration % kConfigurationsAtOnce == 0) nearest.a = nearest.b = kNoIndex;
+  const ObjectPair former = {nearest.a, nearest.b};
+  const NearestTriangles former_triangles = worker.triangles;
+  nearest = {configuration, kNoIndex, kNoIndex, INFINITY, INFINITY};
+  double limit = options.within;
+  const auto look_at = [&](const Candidate& candidate) {
+    if (!worker.enough_memory || candidate.gap > limit) return;
+    bound(options, candidate, candidate.bodies == former ? former_triangles : NearestTriangles{}, worker);
+    limit = nearest.upper == 0 ? -1 : std::min(limit, nearest.upper);
+  };
+  const auto standing_one = [&](std::uint32_t i, std::uint32_t other) {
+    return candidate_of(worker.trees[i], scene.bodies[other], {bodies[i], other},
+                        distance_between(worker.boxes[i], scene.boxes[other]));
+  };
+  worker.candidates.clear();
+  for (const MovingPair& pair : moving_pairs.view()) {
+    const double gap = distance_between(worker.boxes[pair.a], worker.boxes[pair.b]);
+    Candidate candidate = candidate_of(worker.trees[pair.a], worker.trees[pair.b],
+                                       {bodies[pair.a], bodies[pair.b]}, gap);
+    if (candidate.bodies == former) candidate.gap = -1;
+    worker.enough_memory = worker.enough_memory && worker.candidates.push(candidate);
+  }
+  for (std::uint32_t i = 0; i < bodies.size(); ++i) {
+    const std::uint32_t other = former.a == bodies[i] ? former.b : former.b == bodies[i] ? former.a : kNoIndex;
+    if (other != kNoIndex && moves[other] == 0) look_at(standing_one(i, other));
+  }
+  sort_by_gap(worker.candidates);
+  for (const Candidate& candidate : worker.candidates.view()) look_at(candidate);
+  for (std::uint32_t i = 0; i < bodies.size() && standing.kept_of() != 0; ++i) {
+    const auto gap = [&](const WorldBox& box) { return distance_between(worker.boxes[i], box); };
+    standing.kept().visit_nearest(gap, limit, [&](std::size_t place) {
+      const std::uint32_t other = standing.kept().items[place].box;
+      const Candidate candidate = standing_one(i, other);
+      if (candidate.bodies != former && filter.looks_at(bodies[i], other)) look_at(candidate);
+    });
+  }
+  worker.counters.touching += nearest.upper == 0;
+  if (nearest.upper == INFINITY) return;
+  nearest.lower = std::min(nearest.lower, nearest.upper);
+  worker.enough_memory = worker.enough_memory && worker.found.push(nearest);
 }
 
 void ConfigurationQuery::State::work(const SceneState& scene, const ConfigurationOptions& options,
                                      std::size_t configuration, Worker& worker) {
   if (!pose(scene, options, configuration, worker)) return;
+  if (options.find == ConfigurationPairs::nearest)
+    return find_nearest(scene, options, configuration, worker);
   worker.enough_memory = meet(scene, options, worker);
-  bool touching = false;
-  for (const Meeting& meeting : worker.meetings.view()) {
-    if (!worker.enough_memory) return;
-    bool touch = false;
-    ++worker.counters.object_pairs;
-    worker.enough_memory = worker.first_contact.find(*meeting.a, *meeting.b, options.within, touch);
-    if (!touch) continue;
-    touching = true;
-    const ConfigurationPair row = {static_cast<std::uint32_t>(configuration), meeting.bodies.a,
-                                   meeting.bodies.b};
-    worker.enough_memory = worker.enough_memory && worker.found.push(row);
-    if (!options.all_pairs) break;
-  }
-  worker.counters.touching += touching;
+  decide(options, configuration, worker);
 }
 
 Status ConfigurationQuery::answer(SceneState& scene, const ConfigurationOptions& options) {
@@ -191,12 +278,14 @@ Status ConfigurationQuery::answer(SceneState& scene, const ConfigurationOptions&
   State* const state = state_.provide();
   if (state == nullptr) return scene.fail(Status::kOutOfMemory, 0);
   if (scene.device != nullptr) return scene.fail(Status::kBadOption, 0);
-  if (const Status status = check_within(options.within); status != Status::kOk) return scene.fail(status, 0);
+  const Status sound = options.find == ConfigurationPairs::nearest
+                           ? check_distance_options(options.tolerance, options.within)
+                           : check_within(options.within);
+  if (sound != Status::kOk) return scene.fail(sound, 0);
   if (const Status status = state->check_bodies(scene, options.bodies); status != Status::kOk) return status;
   if (moving == 0 ? !options.poses.empty() : options.poses.size() % moving != 0)
     return scene.fail(Status::kMotionMismatch, options.poses.size());
   const std::size_t count = moving == 0 ? 0 : options.poses.size() / moving;
-  if (count >= kNoIndex) return scene.fail(Status::kTooManyPairs, 0);
   if (const Status status = state->prepare(scene, options); status != Status::kOk)
     return scene.fail(status, 0);
 
@@ -209,6 +298,7 @@ Status ConfigurationQuery::answer(SceneState& scene, const ConfigurationOptions&
     worker.counters = {};
     worker.enough_memory = worker.trees.resize(moving) && worker.boxes.resize(moving);
     worker.first_contact.begin();
+    worker.search.reset_counters();
   }
   state->first_refused = options.poses.size();
   scene.threads.for_parts(workers, count, kConfigurationsAtOnce,
@@ -228,7 +318,7 @@ Status ConfigurationQuery::answer(SceneState& scene, const ConfigurationOptions&
     bool enough_memory = worker.enough_memory;
     for (const ConfigurationPair& row : worker.found.view()) enough_memory = enough_memory && rows_.push(row);
     if (!enough_memory) return scene.fail(Status::kOutOfMemory, 0);
-    worker.counters.block_pairs = worker.first_contact.block_pairs();
+    worker.counters.block_pairs = worker.first_contact.block_pairs() + worker.search.found.counters.block_pairs;
     add_to(counters_, worker.counters,
            {&ConfigurationCounters::touching, &ConfigurationCounters::object_pairs,
             &ConfigurationCounters::block_pairs});

@@ -39,37 +39,7 @@ class ProbedBodies {
   /// are passed over; visit(body) may make that less.
   template <typename Bound, typename Visit>
   void visit(const Bound& bound, const double& limit, const Visit& visit) const {
-    const BoxTree& tree = boxes_;
-    if (tree.items.size() == 0) return;
-    struct Entry {
-      double bound;
-      std::size_t number;
-      int level;  // of the group; -1: a body
-    } stack[3 * std::size(BoxTree{}.level_begin) + BoxTree::kGroup + 1];
-    std::size_t height = 0;
-    stack[height++] = {-HUGE_VAL, 0, tree.top()};
-    while (height > 0) {
-      const Entry entry = stack[--height];
-      if (!(entry.bound <= limit)) continue;
-      if (entry.level < 0) {
-        visit(static_cast<std::uint32_t>(entry.number));
-        continue;
-      }
-      const BoxTree::Group& group = tree.level(entry.level)[entry.number];
-      const std::size_t bottom = height;
-      for (std::size_t i = 0; i < BoxTree::kGroup; ++i) {
-        WorldBox box;
-        for (int k = 0; k < 3; ++k) box.lo[k] = group.lo[k][i], box.hi[k] = group.hi[k][i];
-        if (!(box.lo[0] <= box.hi[0])) continue;
-        const double least = bound(box);
-        if (!(least <= limit) || least == HUGE_VAL) continue;
-        const std::size_t below = BoxTree::kGroup * entry.number + i;
-        const Entry next = {least, entry.level == 0 ? tree.items[below].box : below, entry.level - 1};
-        std::size_t at = height++;
-        for (; at > bottom && stack[at - 1].bound < least; --at) stack[at] = stack[at - 1];
-        stack[at] = next;
-      }
-    }
+    boxes_.visit_nearest(bound, limit, [&](std::size_t place) { visit(boxes_.items[place].box); });
   }
 
  private:

@@ -285,7 +285,7 @@ static void test_allocators(const char* folder) {
   const tandem_ray_options rays = {sizeof rays, TANDEM_ALL_HITS, 0, 0, 0, place, along, 1};
   const uint32_t moving[1] = {1};
   const tandem_pose there = {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, {0.5, 0, 0}};
-  const tandem_configuration_options configurations = {sizeof configurations, 1, moving, 1, &there, 1, 0};
+  const tandem_configuration_options configurations = {sizeof configurations, 1, moving, 1, &there, 1, 0, 0, 0};
   const tandem_questions all = {sizeof all, 1,         &pairs, &contacts,       &manifolds, &distances,
                                 &impacts,   &verdicts, NULL,   &configurations, &closest,   &rays};
   int succeeded = 0, refused = 0;

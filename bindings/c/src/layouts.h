@@ -45,7 +45,7 @@ struct Same_tandem_tolerance_counters { using Ours = ToleranceCounters; using Th
   TANDEM_SAME(apart); TANDEM_SAME(touching); TANDEM_SAME(within_tolerance); TANDEM_SAME(work); };
 struct Same_tandem_body_at { using Ours = BodyAt; using Theirs = tandem_body_at; TANDEM_SAME_SIZE(); TANDEM_SAME(point); TANDEM_SAME(body); };
 struct Same_tandem_configuration_pair { using Ours = ConfigurationPair; using Theirs = tandem_configuration_pair; TANDEM_SAME_SIZE();
-  TANDEM_SAME(configuration); TANDEM_SAME(a); TANDEM_SAME(b); };
+  TANDEM_SAME(configuration); TANDEM_SAME(a); TANDEM_SAME(b); TANDEM_SAME(lower); TANDEM_SAME(upper); };
 struct Same_tandem_configuration_counters { using Ours = ConfigurationCounters; using Theirs = tandem_configuration_counters; TANDEM_SAME_SIZE();
   TANDEM_SAME(configurations); TANDEM_SAME(touching); TANDEM_SAME(object_pairs); TANDEM_SAME(block_pairs); };
 struct Same_tandem_closest_point { using Ours = ClosestPoint; using Theirs = tandem_closest_point; TANDEM_SAME_SIZE(); TANDEM_SAME(lower);

@@ -168,13 +168,15 @@ tandem_status read_options(const tandem_ray_options& given, RayOptions& options)
 }
 
 tandem_status read_options(const tandem_configuration_options& given, ConfigurationOptions& options) {
-  if (given.all_pairs > 1) return TANDEM_BAD_OPTION;
+  if (given.find > TANDEM_CONFIGURATION_NEAREST) return TANDEM_BAD_OPTION;
   if (!is_there(given.bodies, given.body_count) || !is_there(given.poses, given.pose_count))
     return TANDEM_NULL_ARGUMENT;
   options.bodies = {given.bodies, given.body_count};
   options.poses = rows<Pose>(given.poses, given.pose_count);
   options.within = given.within;
-  options.all_pairs = given.all_pairs != 0;
+  options.find = static_cast<ConfigurationPairs>(given.find);
+  options.tolerance.absolute = given.absolute_tolerance;
+  if (given.relative_tolerance != 0) options.tolerance.relative = given.relative_tolerance;
   return TANDEM_OK;
 }
 

@@ -209,7 +209,8 @@ class Scene {
     return answer<tandem_scene_find_bodies_at, tandem_scene_bodies_at>(options);
   }
 
-  nb::object configurations(nb::handle bodies, nb::handle instances, double within, bool all_pairs) {
+  nb::object configurations(nb::handle bodies, nb::handle instances, double within, std::uint32_t find,
+                            double absolute_tolerance, double relative_tolerance) {
     const Turn turn = take_turn();
     const auto moving = copy_rows<std::uint32_t>(bodies);
     const std::vector<tandem_pose> places = poses_of(instances);
@@ -219,7 +220,9 @@ class Scene {
     options.poses = places.data();
     options.pose_count = places.size();
     options.within = within;
-    options.all_pairs = all_pairs;
+    options.find = find;
+    options.absolute_tolerance = absolute_tolerance;
+    options.relative_tolerance = relative_tolerance;
     return answer<tandem_scene_find_configurations, tandem_scene_configurations>(options);
   }
 

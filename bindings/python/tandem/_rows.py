@@ -35,8 +35,8 @@ IMPACT = np.dtype([("t_safe", "<f8"), ("gap", "<f8"), ("point_a", "<f8", (3,)), 
 VERDICT = np.dtype([("verdict", "u1"), ("level_a", "u1"), ("level_b", "u1")])
 #: A body whose world box contains a point.
 BODY_AT = np.dtype([("point", "<u4"), ("body", "<u4")])
-#: Two bodies that touch in a configuration; a < b.
-CONFIGURATION_PAIR = np.dtype([("configuration", "<u4"), ("a", "<u4"), ("b", "<u4")])
+#: Two bodies of a configuration, a < b, and bounds of their distance.
+CONFIGURATION_PAIR = np.dtype([("configuration", "<u8"), ("a", "<u4"), ("b", "<u4"), ("lower", "<f8"), ("upper", "<f8")])
 #: The closest point of the bodies of a scene (docs/points_and_rays.md).
 CLOSEST_POINT = np.dtype([("lower", "<f8"), ("upper", "<f8"), ("position", "<f8", (3,)), ("body", "<u4"), ("triangle", "<u4"), ("face", "<u4"),
         ("within", "<u4"), ("winding", "<i4"), ("reserved", "<u4")])

@@ -59,7 +59,7 @@ class Contacts(NamedTuple):
 
 
 class Configurations(NamedTuple):
-    """Whether anything touches in each configuration, (k,) bool, and what does, array of CONFIGURATION_PAIR by ascending configuration."""
+    """Whether anything touches in each configuration, (k,) bool, and what does, or is nearest, array of CONFIGURATION_PAIR by ascending configuration."""
 
     touching: npt.NDArray[np.bool_]
     pairs: Rows
@@ -493,33 +493,42 @@ class Scene:
         return Verdicts(_frombuffer(found, PAIR), _frombuffer(verdicts, VERDICT))
 
     def configurations(self, bodies: npt.ArrayLike, *, rotation: Rotations | None = None, translation: npt.ArrayLike | None = None,
-                       transform: npt.ArrayLike | None = None, within: float = 0.0, all_pairs: bool = False) -> Configurations:
-        """Asks of many configurations whether anything touches: the same, as exactly, as moving the bodies and asking for contacts in each, and many times faster.
-        The scene stays as it is. All its threads take part. Pairs of two bodies that stand are not looked at.
+                       transform: npt.ArrayLike | None = None, within: float | None = None, pairs: Literal["first", "all", "nearest"] = "first",
+                       absolute_tolerance: float = 0.0, relative_tolerance: float = 0.0) -> Configurations:
+        """Asks of many configurations whether anything touches, or how near it comes: the same, as exactly, as moving the bodies and asking for contacts or distances
+        in each, and many times faster. The scene stays as it is. All its threads take part. Pairs of two bodies that stand are not looked at.
 
         Args:
             bodies: (n,), the numbers of the bodies that move, each once. All others stand where they are.
             rotation, translation, transform: of these in each of k configurations (see `tandem.instances`): (k, n, 3, 3), (k, n, 3), (k, n, 4, 4) and so on.
-            within: bodies touch where their distance is at most this; 0: where they meet.
-            all_pairs: whether all pairs that touch are found, not only one for each configuration.
+            within: bodies touch where their distance is at most this; None: where they meet. For "nearest" how far is looked; None: without an end.
+            pairs: "first": one that touches, if any does; "all": all that touch; both with the bounds 0 and `within`. "nearest": the nearest, with bounds of the
+                least distance of all pairs, which are 0 exactly where some meet; touching says where they do.
+            absolute_tolerance, relative_tolerance: of "nearest", as of `distances`.
 
         Raises:
             Error: a pose that is not rigid or reaches too far; `where` is its place among all. A body that there is not; `where` is its place in `bodies`.
 
         >>> found = scene.place(translation=[[0, 0, 0], [5, 0, 0]]).configurations([1], translation=[[[3, 0, 0]], [[0.5, 0, 0]]])
         >>> found.touching.tolist(), found.pairs.tolist()
-        ([False, True], [(1, 0, 1)])
+        ([False, True], [(1, 0, 1, 0.0, 0.0)])
+        >>> scene.configurations([1], translation=[[[3, 0, 0]], [[0.5, 0, 0]]], pairs="nearest").pairs["upper"].round(9).tolist()
+        [2.0, 0.0]
         """
+        find = _choice("pairs", pairs, ("first", "all", "nearest"))
+        farthest = np.inf if pairs == "nearest" else FARTHEST
+        looked = amount(within, "within", farthest) if within is not None else np.inf if pairs == "nearest" else 0.0
         moving = np.atleast_1d(whole_numbers(bodies, "bodies"))
         poses = instances_of(None, None, *map(_of_all, (rotation, translation, transform)))
         count = len(poses) // len(moving) if len(moving) else 0
         try:
-            pairs = _frombuffer(self._core.configurations(moving, poses, amount(within, "within", FARTHEST), flag(all_pairs, "all_pairs")), CONFIGURATION_PAIR)
+            found = _frombuffer(self._core.configurations(moving, poses, looked, find, amount(absolute_tolerance, "absolute_tolerance", np.inf),
+                                                          amount(relative_tolerance, "relative_tolerance", np.inf)), CONFIGURATION_PAIR)
         except Error as error:
             raise explained(error, poses) from None
         touching = np.zeros(count, bool)
-        touching[pairs["configuration"]] = True
-        return Configurations(touching, pairs)
+        touching[found["configuration"] if pairs != "nearest" else found["configuration"][found["upper"] == 0]] = True
+        return Configurations(touching, found)
 
     def bodies_at(self, points: npt.ArrayLike) -> Rows:
         """Finds which bodies' world boxes contain points, (n, 3) or one: array of BODY_AT by point, then by body.

@@ -28,7 +28,7 @@ from ._arrays import Rows, flag
 from ._asset import Asset
 from ._build import Effort, Levels, build as _build_asset
 from ._errors import Error
-from ._rows import PAIR
+from ._rows import CONFIGURATION_PAIR, PAIR
 from ._scene import Contacts
 
 __all__ = ["Incomplete", "Library", "build", "check", "contacts"]
@@ -330,7 +330,7 @@ def check(scene: jobs.FileScene, configurations: npt.ArrayLike | Rows, *, pairs:
         pairs: which pairs touch, instead of whether any does.
 
     Returns:
-        (k,) bool; with `pairs` an array of jobs.TOUCHING, by configuration, then by pair.
+        (k,) bool; with `pairs` an array of CONFIGURATION_PAIR, by configuration, then by pair.
 
     Raises:
         Incomplete: some configurations have no answer.
@@ -346,7 +346,7 @@ def check(scene: jobs.FileScene, configurations: npt.ArrayLike | Rows, *, pairs:
     if client.status == "running":  # once, and again where the worker that has it dies
         sent = client.submit(_same, scene, key=f"tandem-scene-{uuid.uuid4().hex}")
     answers = dict(_answers(client, "check", function, [(sent, rows[begin:begin + size]) for begin in first]))
-    found, missing = [np.empty(0, jobs.TOUCHING if pairs else bool)], [np.empty(0, np.uint64)]
+    found, missing = [np.empty(0, CONFIGURATION_PAIR if pairs else bool)], [np.empty(0, np.uint64)]
     for number, begin in enumerate(first):
         answer = answers[number]
         if isinstance(answer, _Lost):

@@ -31,10 +31,8 @@ from ._errors import Error
 from ._rows import CONTACT, INSTANCE, PAIR
 from ._scene import Configurations, Contacts, Counters, Filter, Scene
 
-__all__ = ["AssetFile", "BuildOptions", "Built", "FileScene", "NotWritten", "Slice", "TOUCHING", "ask", "build_file", "divide", "file_of", "join", "touching", "verdicts"]
+__all__ = ["AssetFile", "BuildOptions", "Built", "FileScene", "NotWritten", "Slice", "ask", "build_file", "divide", "file_of", "join", "touching", "verdicts"]
 
-#: Two bodies that touch in a configuration.
-TOUCHING = np.dtype([("configuration", "<u8"), ("a", "<u4"), ("b", "<u4")])
 _CHECKED_AT_ONCE = 1 << 16
 #: What a pair costs whose boxes hardly overlap, in triangles.
 _WORK_OF_A_PAIR = 64.0
@@ -362,7 +360,7 @@ def _kept(scene: FileScene) -> Scene:
 
 
 def _answered(scene: FileScene, poses: Rows, all_pairs: bool) -> Configurations:
-    return _kept(scene).configurations(scene.moving, rotation=poses["rotation"], translation=poses["translation"], all_pairs=all_pairs)
+    return _kept(scene).configurations(scene.moving, rotation=poses["rotation"], translation=poses["translation"], pairs="all" if all_pairs else "first")
 
 
 def verdicts(scene: FileScene, poses: Rows) -> npt.NDArray[np.bool_]:
@@ -375,5 +373,5 @@ def verdicts(scene: FileScene, poses: Rows) -> npt.NDArray[np.bool_]:
 
 
 def touching(scene: FileScene, poses: Rows) -> Rows:
-    """Finds the pairs that touch in each configuration, as `verdicts` says whether there are any: array of TOUCHING, by configuration, then by pair."""
-    return _answered(scene, poses, True).pairs.astype(TOUCHING)
+    """Finds the pairs that touch in each configuration, as `verdicts` says whether there are any: array of CONFIGURATION_PAIR, by configuration, then by pair."""
+    return _answered(scene, poses, True).pairs

@@ -7,6 +7,7 @@
 #include "kernels/contact/contact_query_fixture.h"
 #include "kernels/scene/filter_oracle.h"
 #include "tandem/kernels/configuration_query.h"
+#include "tandem/kernels/distance_query.h"
 
 namespace tandem {
 namespace {
@@ -56,7 +57,7 @@ Rows by_contacts(const Question& question, const PairFilter& filter, double with
     for (const Contact& contact : query.rows()) {
       const ObjectPair pair = query.pairs()[contact.pair];
       const auto moves = [&](std::uint32_t body) { return std::ranges::count(question.bodies, body) != 0; };
-      if (moves(pair.a) || moves(pair.b)) rows.push_back({i, pair.a, pair.b});
+      if (moves(pair.a) || moves(pair.b)) rows.push_back({i, pair.a, pair.b, 0, within});
     }
   }
   std::ranges::sort(rows);
@@ -82,13 +83,13 @@ TEST(Configurations, TouchWhereContactsOfTheMovedSceneDoWhateverTheFilterAndTheT
         ASSERT_EQ(scene.set_threads(threads), Status::kOk);
         ConfigurationOptions options = question.options();
         options.within = within;
-        options.all_pairs = true;
+        options.find = ConfigurationPairs::all;
         ASSERT_EQ(query.find(scene, options), Status::kOk);
         EXPECT_TRUE(std::ranges::equal(query.rows(), expected));
-        options.all_pairs = false;
+        options.find = ConfigurationPairs::first;
         ASSERT_EQ(query.find(scene, options), Status::kOk);
         // One of each, and it is one of all.
-        std::map<std::uint32_t, int> of_each;
+        std::map<std::uint64_t, int> of_each;
         for (const ConfigurationPair& row : query.rows()) {
           ++of_each[row.configuration];
           EXPECT_TRUE(std::ranges::binary_search(expected, row));
@@ -110,6 +111,83 @@ TEST(Configurations, TouchWhereContactsOfTheMovedSceneDoWhateverTheFilterAndTheT
   }
   EXPECT_GT(touching, 400u);
   EXPECT_GT(free, 400u);
+}
+
+// The least interval of each configuration, of pairs of which one moves at least; none beyond reach.
+Rows by_distances(const Question& question, const PairFilter& filter, double reach) {
+  Scene scene;
+  EXPECT_EQ(scene.set_assets(question.scene.assets.views()), Status::kOk);
+  EXPECT_EQ(scene.place(question.scene.instances, filter), Status::kOk);
+  EXPECT_EQ(scene.remove(17), Status::kOk);
+  DistanceQuery query;
+  Rows rows;
+  const std::size_t moving = question.bodies.size();
+  for (std::uint32_t i = 0; i < kConfigurations; ++i) {
+    const std::span<const Pose> poses = std::span(question.poses).subspan(i * moving, moving);
+    EXPECT_EQ(scene.move(question.bodies, poses), Status::kOk);
+    EXPECT_EQ(query.find(scene, {.reach = reach}), Status::kOk);
+    ConfigurationPair least = {i, kNoIndex, kNoIndex, HUGE_VAL, HUGE_VAL};
+    for (std::size_t k = 0; k < query.rows().size(); ++k) {
+      const ObjectPair pair = query.pairs()[k];
+      const auto moves = [&](std::uint32_t body) { return std::ranges::count(question.bodies, body) != 0; };
+      if (!moves(pair.a) && !moves(pair.b)) continue;
+      least.lower = std::min(least.lower, query.rows()[k].lower);
+      if (query.rows()[k].upper < least.upper)
+        least.a = pair.a, least.b = pair.b, least.upper = query.rows()[k].upper;
+    }
+    if (least.upper < HUGE_VAL) rows.push_back(least);
+  }
+  return rows;
+}
+
+TEST(Configurations, AreAsNearAsTheNearestPairOfTheMovedSceneWhateverTheFilterAndTheThreads) {
+  std::size_t touching = 0, apart = 0, beyond = 0;
+  for (const unsigned parts : {0u, 14u, 31u}) {
+    const Question question(parts);
+    ExcludedPairTable table;
+    const PairFilter filter = question.filter.view(table);
+    Scene scene;
+    ASSERT_EQ(scene.set_assets(question.scene.assets.views()), Status::kOk);
+    ASSERT_EQ(scene.place(question.scene.instances, filter), Status::kOk);
+    ASSERT_EQ(scene.remove(17), Status::kOk);
+    for (const double reach : {0.0, 0.1, HUGE_VAL}) {
+      const Rows expected = by_distances(question, filter, reach);
+      ConfigurationQuery query;
+      Rows found;
+      ConfigurationCounters counted;
+      for (const std::uint32_t threads : {1u, 2u, 5u}) {
+        SCOPED_TRACE(testing::Message() << "filter " << parts << ", reach " << reach << ", " << threads);
+        ASSERT_EQ(scene.set_threads(threads), Status::kOk);
+        ConfigurationOptions options = question.options();
+        options.within = reach;
+        options.find = ConfigurationPairs::nearest;
+        ASSERT_EQ(query.find(scene, options), Status::kOk);
+        ASSERT_EQ(query.rows().size(), expected.size());
+        for (std::size_t i = 0; i < expected.size(); ++i) {
+          const ConfigurationPair &x = query.rows()[i], &y = expected[i];
+          EXPECT_EQ(x.configuration, y.configuration);
+          EXPECT_LE(x.lower, y.upper);
+          EXPECT_LE(y.lower, x.upper);
+          EXPECT_LE(x.upper - x.lower, 1.0001e-6 * x.upper);
+          EXPECT_EQ(x.upper == 0, y.upper == 0);
+          if (x.upper > 0) {
+            EXPECT_EQ(ObjectPair(x.a, x.b), ObjectPair(y.a, y.b));
+          }
+          (x.upper == 0 ? touching : apart) += 1;
+        }
+        beyond += kConfigurations - expected.size();
+        if (threads > 1) {
+          EXPECT_EQ(query.counters(), counted);
+          EXPECT_TRUE(std::ranges::equal(query.rows(), found));
+        }
+        counted = query.counters();
+        found.assign(query.rows().begin(), query.rows().end());
+      }
+    }
+  }
+  EXPECT_GT(touching, 200u);
+  EXPECT_GT(apart, 150u);
+  EXPECT_GT(beyond, 200u);
 }
 
 // What stands is prepared once, and again where anything of it changes.
@@ -168,6 +246,11 @@ TEST(Configurations, WhatCannotBeAskedIsNamed) {
   expect(Status::kMotionMismatch, 7);
   options.within = -1;
   expect(Status::kBadReach, 0);
+  options.within = HUGE_VAL;
+  expect(Status::kBadReach, 0);
+  options.find = ConfigurationPairs::nearest;
+  options.tolerance.absolute = -1;
+  expect(Status::kBadTolerance, 0);
   for (const std::uint32_t threads : {1u, 3u}) {
     ASSERT_EQ(scene.set_threads(threads), Status::kOk);
     const Pose kept[] = {question.poses[100], question.poses[300]};

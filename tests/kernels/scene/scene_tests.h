@@ -124,7 +124,9 @@ inline void expect_same_answers(const Questions& here, const Questions& there) {
 template <typename TheScene>
 class ChangingScene {
  public:
-  explicit ChangingScene(std::uint64_t seed, int bodies) : random_(seed), start_(crowd(seed, bodies)) {
+  /// spread: half the side of the cube in which bodies are that were added or moved.
+  explicit ChangingScene(std::uint64_t seed, int bodies, double spread = 3)
+      : random_(seed), spread_(spread), start_(crowd(seed, bodies)) {
     EXPECT_EQ(scene_.set_assets(start_.assets.views()), Status::kOk);
     bodies_ = start_.instances;
     filters_.resize(bodies_.size());
@@ -138,6 +140,12 @@ class ChangingScene {
     drop_removed();
     const Arrays arrays(filters_);
     ASSERT_EQ(scene_.place(bodies_, arrays.view()), Status::kOk);
+  }
+
+  /// Moves all bodies to places of their own choice.
+  void scatter() {
+    for (Instance& body : bodies_) body.pose = any_instance().pose;
+    place();
   }
 
   /// One of the ways to change the scene.
@@ -191,6 +199,19 @@ class ChangingScene {
 
   /// Expects what a scene finds that is made anew of the bodies, whose numbers are their places among them.
   void expect_same(double reach, bool self_pairs) {
+    Scene anew;
+    expect_same_pairs(reach, self_pairs, anew);
+    ContactQuery here, there;
+    const ContactOptions options = {.self_pairs = self_pairs, .within = reach};
+    ASSERT_EQ(here.find(scene_, options), Status::kOk);
+    ASSERT_EQ(there.find(anew, options), Status::kOk);
+    EXPECT_EQ(sorted(here), sorted(there));
+    if constexpr (std::is_same_v<TheScene, Scene>) {
+      EXPECT_EQ(here.counters(), there.counters());
+    }
+    found_ += here.rows().size();
+  }
+  void expect_same_pairs(double reach, bool self_pairs, Scene& anew) {
     std::vector<Instance> bodies;
     std::vector<BodyFilter> filters;
     std::vector<std::uint32_t> number;
@@ -201,7 +222,6 @@ class ChangingScene {
       number.push_back(i);
     }
     const Arrays arrays(filters);
-    Scene anew;
     ASSERT_EQ(anew.set_assets(start_.assets.views()), Status::kOk);
     ASSERT_EQ(anew.place(bodies, arrays.view()), Status::kOk);
     ASSERT_EQ(anew.find_pairs(reach, self_pairs), Status::kOk);
@@ -209,15 +229,6 @@ class ChangingScene {
     for (const auto& [a, b] : pairs_of(anew)) expected.emplace_back(number[a], number[b]);
     ASSERT_EQ(scene_.find_pairs(reach, self_pairs), Status::kOk);
     EXPECT_EQ(pairs_of(scene_), expected);
-    ContactQuery here, there;
-    const ContactOptions options = {.self_pairs = self_pairs, .within = reach};
-    ASSERT_EQ(here.find(scene_, options), Status::kOk);
-    ASSERT_EQ(there.find(anew, options), Status::kOk);
-    EXPECT_EQ(sorted(here), sorted(there));
-    if constexpr (std::is_same_v<TheScene, Scene>) {
-      EXPECT_EQ(here.counters(), there.counters());
-    }
-    found_ += here.rows().size();
   }
 
   std::size_t found() const { return found_; }
@@ -229,11 +240,12 @@ class ChangingScene {
         motion.push_back(filter.motion);
         group.push_back(filter.group);
         mask.push_back(filter.mask);
+        world.push_back(filter.world);
       }
     }
-    PairFilter view() const { return {motion.data(), group.data(), mask.data(), {}}; }
+    PairFilter view() const { return {motion.data(), group.data(), mask.data(), world.data()}; }
     std::vector<Motion> motion;
-    std::vector<std::uint32_t> group, mask;
+    std::vector<std::uint32_t> group, mask, world;
   };
 
   // place() takes bodies that are there.
@@ -247,7 +259,7 @@ class ChangingScene {
 
   Instance any_instance() {
     Pose pose = any_rotation(random_);
-    for (double& x : pose.translation) x = random_.symmetric(3);
+    for (double& x : pose.translation) x = random_.symmetric(spread_);
     return {static_cast<std::uint32_t>(random_.below(3)), pose};
   }
   BodyFilter any_filter() {
@@ -255,10 +267,12 @@ class ChangingScene {
     if (random_.below(3) == 0) filter.motion = static_cast<Motion>(random_.below(4));
     if (random_.below(4) == 0) filter.group = 1u << random_.below(3);
     if (random_.below(4) == 0) filter.mask = ~(1u << random_.below(3));
+    if (random_.below(4) == 0) filter.world = static_cast<std::uint32_t>(random_.below(2));
     return filter;
   }
 
   RandomPoses random_;
+  double spread_;
   BodyScene start_;
   TheScene scene_;
   std::vector<Instance> bodies_;
@@ -293,6 +307,30 @@ TYPED_TEST_P(SceneOn, FindsThePairsOfItsBodiesWhateverChanged) {
       changing.expect_same(reach, selves);
     }
     found += changing.found();
+  }
+  EXPECT_GT(found, 10'000u);
+}
+
+/// A tree follows the few that change, until it is worn out, or many have changed.
+TYPED_TEST_P(SceneOn, FindsThePairsOfTheFewThatChange) {
+  std::size_t found = 0;
+  for (std::uint64_t seed = 0; seed < 4; ++seed) {
+    ChangingScene<TypeParam> changing(400 + seed, 600, 12);
+    EXPECT_EQ(changing.scene().set_threads(seed % 3 == 1 ? 3 : 1), Status::kOk);
+    RandomPoses random(500 + seed);
+    double reach = 0;
+    bool selves = false;
+    for (int step = 0; step < 150 && !testing::Test::HasFailure(); ++step) {
+      SCOPED_TRACE(testing::Message() << "seed " << seed << ", step " << step);
+      const std::uint64_t changes = random.below(18);
+      for (std::uint64_t i = 0; i < changes; ++i) changing.change();
+      if (step == 0 || random.below(50) == 0) changing.scatter();
+      if (random.below(40) == 0) reach = random.below(3) == 0 ? HUGE_VAL : random.uniform(0, 1);
+      if (random.below(40) == 0) selves = !selves;
+      Scene anew;
+      changing.expect_same_pairs(reach, selves, anew);
+      found += anew.pairs().size();
+    }
   }
   EXPECT_GT(found, 10'000u);
 }
@@ -533,7 +571,7 @@ TYPED_TEST_P(SceneOn, RefusesPositionsAndStaysAsItIs) {
   expect_same_answers(here, there);
 }
 
-REGISTER_TYPED_TEST_SUITE_P(SceneOn, FindsThePairsOfItsBodiesWhateverChanged,
+REGISTER_TYPED_TEST_SUITE_P(SceneOn, FindsThePairsOfItsBodiesWhateverChanged, FindsThePairsOfTheFewThatChange,
                             FindsThePairsOfBodiesThatHardlyMove, RefusesListsOfDifferentLengths,
                             AnswersManyQuestionsAboutTheSameBodies, AnswersOfNoBodiesAreEmpty,
                             AnswersQuestionsAboutBodiesThatBend, FindsContactsOfBodiesThatBendWildly,

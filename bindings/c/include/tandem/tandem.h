@@ -787,29 +787,41 @@ TANDEM_API const tandem_body_at* tandem_scene_bodies_at(const tandem_scene* scen
 /// multiple of body_count.
 typedef struct tandem_configuration_options {
   uint32_t struct_size;
-  uint32_t all_pairs;      ///< 1: all bodies that touch are found, 0: two for each configuration at most
+  uint32_t find;           ///< tandem_configuration_pairs
   const uint32_t* bodies;  ///< that move, each once; all others stand where they are
   size_t body_count;
   const tandem_pose* poses;
   size_t pose_count;
-  double within;  ///< bodies touch where their distance is at most this
+  double within;                ///< bodies touch where their distance is at most this; or how far is looked
+  double absolute_tolerance;    ///< of TANDEM_CONFIGURATION_NEAREST, as of tandem_distance_options
+  double relative_tolerance;
 } tandem_configuration_options;
 
-/// Two bodies that touch in a configuration; a < b.
+/// Says which pairs of a configuration are found.
+typedef enum tandem_configuration_pairs {
+  TANDEM_CONFIGURATION_FIRST = 0,   ///< one that touches, if any does: lower is 0, upper is `within`
+  TANDEM_CONFIGURATION_ALL = 1,     ///< all that touch; as above
+  TANDEM_CONFIGURATION_NEAREST = 2  ///< the nearest, unless all are surely farther apart than `within`, which
+                                    ///< may be infinite; bounds are of the least distance of all pairs
+} tandem_configuration_pairs;
+
+/// Two bodies of a configuration; a < b.
 typedef struct tandem_configuration_pair {
-  uint32_t configuration;
+  uint64_t configuration;
   uint32_t a, b;
+  double lower, upper;  ///< of their distance
 } tandem_configuration_pair;
 
 typedef struct tandem_configuration_counters {
   uint64_t configurations, touching, object_pairs, block_pairs;
 } tandem_configuration_counters;
 
-/// Asks of many configurations of a scene whether anything touches. What stands is prepared once, and the
-/// scene stays as it is. Pairs of two bodies that stand are not looked at. Rows ascend by configuration.
-/// Result: TANDEM_UNKNOWN_INSTANCE, where `where` is the place in `bodies` of one that does not exist or
-/// stands there twice; TANDEM_MOTION_MISMATCH; TANDEM_BAD_REACH; TANDEM_POSE_NOT_RIGID or
-/// TANDEM_OUT_OF_RANGE, where `where` is the first such pose; TANDEM_BAD_OPTION where a device answers.
+/// Asks of many configurations of a scene whether anything touches, or how near it comes. What stands is
+/// prepared once, and the scene stays as it is. Pairs of two bodies that stand are not looked at. Rows ascend
+/// by configuration. Result: TANDEM_UNKNOWN_INSTANCE, where `where` is the place in `bodies` of one that does
+/// not exist or stands there twice; TANDEM_MOTION_MISMATCH; TANDEM_BAD_REACH; TANDEM_BAD_TOLERANCE;
+/// TANDEM_POSE_NOT_RIGID or TANDEM_OUT_OF_RANGE, where `where` is the first such pose; TANDEM_BAD_OPTION where
+/// a device answers.
 TANDEM_API tandem_status tandem_scene_find_configurations(tandem_scene* scene,
                                                           const tandem_configuration_options* options);
 TANDEM_API const tandem_configuration_pair* tandem_scene_configurations(const tandem_scene* scene,

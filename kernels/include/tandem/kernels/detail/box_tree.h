@@ -1,4 +1,5 @@
 #pragma once
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <iterator>
@@ -62,6 +63,12 @@ struct BoxTree {
   void visit(const WorldBox& box, const Visit& each) const {
     visit(box, nullptr, each);
   }
+
+  /// Visits places in about the order of a bound: bound(world box) -> double is not above what it is for
+  /// anything in the box, and infinity where nothing there counts. Those with a bound of more than `limit`
+  /// are passed over; visit(place) may make that less.
+  template <typename Bound, typename Visit>
+  void visit_nearest(const Bound& bound, const double& limit, const Visit& visit) const;
 };
 
 template <typename Visit>
@@ -88,6 +95,39 @@ void BoxTree::visit(const WorldBox& box, const Kind* kind, const Visit& visit) c
       } else {
         stack[height++] = {kGroup * at.group + i, at.level - 1};
       }
+    }
+  }
+}
+
+template <typename Bound, typename Visit>
+void BoxTree::visit_nearest(const Bound& bound, const double& limit, const Visit& visit) const {
+  if (items.size() == 0) return;
+  struct Entry {
+    double bound;
+    std::size_t number;  // of the group, or a place
+    int level;           // of the group; -1: a place
+  } stack[(kGroup - 1) * std::size(BoxTree{}.level_begin) + kGroup + 1];
+  std::size_t height = 0;
+  stack[height++] = {-HUGE_VAL, 0, top()};
+  while (height > 0) {
+    const Entry entry = stack[--height];
+    if (!(entry.bound <= limit)) continue;
+    if (entry.level < 0) {
+      visit(entry.number);
+      continue;
+    }
+    const Group& group = level(entry.level)[entry.number];
+    const std::size_t bottom = height;
+    for (std::size_t i = 0; i < kGroup; ++i) {
+      WorldBox box;
+      for (int k = 0; k < 3; ++k) box.lo[k] = group.lo[k][i], box.hi[k] = group.hi[k][i];
+      if (!(box.lo[0] <= box.hi[0])) continue;
+      const double least = bound(box);
+      if (!(least <= limit) || least == HUGE_VAL) continue;
+      const Entry next = {least, kGroup * entry.number + i, entry.level - 1};
+      std::size_t at = height++;
+      for (; at > bottom && stack[at - 1].bound < least; --at) stack[at] = stack[at - 1];
+      stack[at] = next;
     }
   }
 }

@@ -22,8 +22,8 @@ COMPONENT = np.dtype([("first_triangle", "<u4"), ("triangles", "<u4"), ("flags",
 KINDS = {1: ("levels", LEVEL), 2: ("blocks", BLOCK), 3: ("triangles", TRIANGLE), 4: ("parts", PART),
          5: ("strings", np.dtype("u1")), 6: ("provenance", np.dtype("u1")), 7: ("oriented_blocks", ORIENTED_BLOCK),
          8: ("topology", TOPOLOGY), 9: ("components", COMPONENT),
-         10: ("source_vertices", np.dtype("<u4")), 11: ("block_order", np.dtype("<u4"))}
-OF_A_LEVEL = ("blocks", "triangles", "oriented_blocks", "topology", "components", "source_vertices", "block_order")
+         10: ("source_vertices", np.dtype("<u4"))}
+OF_A_LEVEL = ("blocks", "triangles", "oriented_blocks", "topology", "components", "source_vertices")
 INTERNAL, LEAF, IMAGINARY = 0, 1, 2
 NO_INDEX = 0xFFFFFFFF
 LEAF_BLOCK = 1 << 31
@@ -52,7 +52,6 @@ class BvhFile:
     components: np.ndarray | None
     source_vertex_count: int
     source_vertices: np.ndarray | None
-    block_order: np.ndarray | None
     parts: list
     provenance: dict
 
@@ -110,7 +109,7 @@ def parse(raw, wanted=0):
     return BvhFile(raw, wanted, content_hash, np.array([ox, oy, oz]), np.array(lower, np.float32), np.array(upper, np.float32),
                    source_faces, rounding_error, found["levels"], found["blocks"], found["triangles"],
                    found.get("oriented_blocks"), found.get("topology"), found.get("components"), source_vertex_count,
-                   found.get("source_vertices"), found.get("block_order"), parts,
+                   found.get("source_vertices"), parts,
                    json.loads(found["provenance"].tobytes()))
 
 
@@ -301,8 +300,6 @@ def defects_of_oriented_blocks(file):
             first = begin
     if next_number != len(file.oriented_blocks):
         defects.append("there are other oriented blocks than blocks")
-    if file.block_order is not None and {block: at for at, block in enumerate(file.block_order.tolist())} != number:
-        defects.append("the block order is not that of the oriented blocks")
     return defects
 
 

@@ -62,7 +62,6 @@ constexpr SectionRule kSectionRules[] = {
     {SectionKind::topology, sizeof(TriangleTopology), true},
     {SectionKind::components, sizeof(SurfaceComponent), true},
     {SectionKind::source_vertices, sizeof(std::uint32_t), true},
-    {SectionKind::block_order, sizeof(std::uint32_t), true},
 };
 
 Status check_section(const Section& section, const FileHeader& header) {
@@ -133,13 +132,10 @@ bool has_sound_topology(const Level& level, std::span<const TriangleTopology> to
          level.vertex_count <= 3 * topology.size() && level.flags <= kClosedLevel;
 }
 
-// Returns whether a level has the sections that refitting needs, of the right sizes, or none of them.
-bool has_sound_refit(const Level& level, std::span<const std::uint32_t> source_vertices,
-                     std::span<const std::uint32_t> block_order, bool has_oriented_blocks) {
-  if (source_vertices.data() == nullptr) return block_order.data() == nullptr;
-  return level.vertex_count >= 1 && source_vertices.size() == level.vertex_count &&
-         (block_order.data() != nullptr) == has_oriented_blocks &&
-         (!has_oriented_blocks || block_order.size() == level.block_count);
+// Returns whether a level has a source vertex for each vertex of its topology, or none at all.
+bool has_sound_source_vertices(const Level& level, std::span<const std::uint32_t> source_vertices) {
+  return source_vertices.data() == nullptr ||
+         (level.vertex_count >= 1 && source_vertices.size() == level.vertex_count);
 }
 
 CheckResult check_levels(const unsigned char* data, const FileHeader& header,
@@ -155,7 +151,6 @@ CheckResult check_levels(const unsigned char* data, const FileHeader& header,
     const auto topology = elements<TriangleTopology>(data, sections, SectionKind::topology, i);
     const auto components = elements<SurfaceComponent>(data, sections, SectionKind::components, i);
     const auto sources = elements<std::uint32_t>(data, sections, SectionKind::source_vertices, i);
-    const auto order = elements<std::uint32_t>(data, sections, SectionKind::block_order, i);
     names_source_vertices = names_source_vertices || sources.data() != nullptr;
     if (blocks.empty() || triangles.empty()) return {Status::kSectionMissing, i, {}};
     const double least_error = i == 0 ? 0 : levels[i - 1].error_bound;
@@ -164,7 +159,7 @@ CheckResult check_levels(const unsigned char* data, const FileHeader& header,
     sound = sound && (oriented.data() == nullptr ||
                       (oriented.size() == blocks.size() && triangles.size() < kMostOrientedTriangles));
     sound = sound && has_sound_topology(level, topology, components);
-    sound = sound && has_sound_refit(level, sources, order, oriented.data() != nullptr);
+    sound = sound && has_sound_source_vertices(level, sources);
     sound = sound && std::isfinite(level.error_bound) && level.error_bound >= least_error;
     sound = sound && (i > 0 || level.error_bound == 0);
     if (!sound) return {Status::kBadLevel, i, {}};

@@ -52,8 +52,6 @@ class OrientedWalk {
     int real = kNodesPerBlock;
     while (block.kind[real - 1] == NodeKind::imaginary) --real;
     where_ = oriented;
-    if (level_.block_order != nullptr && level_.block_order[oriented] != b)
-      return Status::kBlockOrderMismatch;
     if (const Status status = check_block(block, level_.oriented_blocks[oriented], real);
         status != Status::kOk)
       return status;

@@ -76,8 +76,6 @@ constexpr Entry kEntries[] = {
      "a box or the size of an oriented block is impossible"},
     {kTriangleOutsideOrientedBox, "TriangleOutsideOrientedBox", "oriented block",
      "an oriented box does not contain a triangle below it"},
-    {kBlockOrderMismatch, "BlockOrderMismatch", "oriented block",
-     "the block order names another block than the one that an oriented block belongs to"},
     {kBadTopology, "BadTopology", "triangle or component",
      "a vertex is out of range, a flag unknown, or a component impossible"},
     {kVertexOrder, "VertexOrder", "triangle", "vertices are not numbered by first appearance"},

@@ -23,8 +23,6 @@ LevelView AssetView::level(std::uint32_t i) const {
     }
     if (section.kind == SectionKind::source_vertices)
       view.source_vertices = reinterpret_cast<const std::uint32_t*>(base + section.offset);
-    if (section.kind == SectionKind::block_order)
-      view.block_order = reinterpret_cast<const std::uint32_t*>(base + section.offset);
   }
   const Level& level = levels[i];
   view.block_count = level.block_count;

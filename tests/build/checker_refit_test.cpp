@@ -1,4 +1,4 @@
-// Tests what the checker says of source vertices and of the order of oriented blocks.
+// Tests what the checker says of source vertices.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -24,15 +24,9 @@ const Attack kRangeAttacks[] = {
     {"no source vertices", kBadHeader, [](Bytes& f) { f.header().source_vertices = 0; }},
     {"2^32 source vertices", kBadHeader,
      [](Bytes& f) { f.header().source_vertices = std::uint64_t{1} << 32; }},
-    {"blocks that change places", kBlockOrderMismatch,
-     [](Bytes& f) { std::swap(f.block_order()[1], f.block_order()[2]); }},
-    {"a block past the end", kBlockOrderMismatch,
-     [](Bytes& f) { f.block_order()[3] = f.level().block_count; }},
-    {"a block twice", kBlockOrderMismatch, [](Bytes& f) { f.block_order()[2] = f.block_order()[1]; }},
-    {"another root", kBlockOrderMismatch, [](Bytes& f) { f.block_order()[0] = 1; }},
 };
 
-TEST(CheckRefit, NamesHostileSectionsInAQuickCheckToo) {
+TEST(CheckRefit, NamesVerticesOutOfRangeInAQuickCheckToo) {
   expect_all_named(refittable(), kRangeAttacks, [](Status) { return false; });
   EXPECT_EQ(refittable().check(CheckDepth::quick).status, kOk);
 }
@@ -46,7 +40,7 @@ TEST(CheckRefit, NoTwoVerticesHaveOneSourceVertexWhichAQuickCheckBelieves) {
   expect_all_named(refittable(), kDoubles, [](Status) { return true; });
 }
 
-TEST(CheckRefit, AcceptsTheSampleAndShowsBothSections) {
+TEST(CheckRefit, AcceptsTheSampleAndShowsItsSection) {
   const Bytes file = refittable();
   const CheckResult result = file.check();
   ASSERT_EQ(result.status, kOk) << name(result.status);
@@ -54,7 +48,6 @@ TEST(CheckRefit, AcceptsTheSampleAndShowsBothSections) {
   EXPECT_EQ(defect_of(level), nullptr);
   EXPECT_EQ(result.asset.header->source_vertices, 90u);
   ASSERT_NE(level.source_vertices, nullptr);
-  ASSERT_NE(level.block_order, nullptr);
   for (std::uint32_t t = 0; t < level.triangle_count; ++t) {
     // Triangle t of the file is source face f of the mesh, whose corners are points 3 f to 3 f + 2.
     for (std::uint32_t k = 0; k < 3; ++k)
@@ -64,7 +57,6 @@ TEST(CheckRefit, AcceptsTheSampleAndShowsBothSections) {
   const CheckResult without = plain.check();
   EXPECT_EQ(without.asset.header->source_vertices, 0u);
   EXPECT_EQ(without.asset.level().source_vertices, nullptr);
-  EXPECT_EQ(without.asset.level().block_order, nullptr);
 }
 
 TEST(CheckRefit, OfEqualVerticesTheFirstIsTheSource) {
@@ -139,55 +131,40 @@ void cut_words(Piece& piece, std::size_t count) {
   piece.bytes.resize(count * sizeof(std::uint32_t));
 }
 
-TEST(CheckRefit, BothSectionsBelongToTopologyAndToOrientedBlocks) {
+TEST(CheckRefit, SourceVerticesBelongToTopology) {
   using Pieces = std::vector<Piece>;
-  constexpr auto kSources = SectionKind::source_vertices, kOrder = SectionKind::block_order;
+  constexpr auto kSources = SectionKind::source_vertices;
   const auto without = [](SectionKind kind) {
     return [=](Pieces& p, FileHeader&) { p.erase(find_piece(p, kind)); };
   };
   EXPECT_EQ(status_after_change([](Pieces&, FileHeader&) {}), kOk);
   EXPECT_EQ(status_after_change([](Pieces& p, FileHeader&) { std::reverse(p.begin(), p.end()); }), kOk);
-  EXPECT_EQ(status_after_change(without(kSources)), kBadLevel);
-  EXPECT_EQ(status_after_change(without(kOrder)), kBadLevel);
-  EXPECT_EQ(status_after_change(without(SectionKind::oriented_blocks)), kBadLevel);
-  const auto without_both = [&](Pieces& p, FileHeader& header) {
-    without(kSources)(p, header), without(kOrder)(p, header);
-  };
-  EXPECT_EQ(status_after_change(without_both), kBadHeader);  // which says that there are source vertices
+  EXPECT_EQ(status_after_change(without(kSources)), kBadHeader);  // which says that there are some
   EXPECT_EQ(status_after_change([&](Pieces& p, FileHeader& header) {
-              without_both(p, header);
+              without(kSources)(p, header);
               header.source_vertices = 0;
             }),
             kOk);
-  EXPECT_EQ(status_after_change([&](Pieces& p, FileHeader& header) {
-              without(kOrder)(p, header), without(SectionKind::oriented_blocks)(p, header);
-            }),
-            kOk);
+  EXPECT_EQ(status_after_change(without(SectionKind::oriented_blocks)), kOk);
   EXPECT_EQ(status_after_change([&](Pieces& p, FileHeader&) { cut_words(*find_piece(p, kSources), 89); }),
             kBadLevel);
-  EXPECT_EQ(status_after_change([&](Pieces& p, FileHeader&) { cut_words(*find_piece(p, kOrder), 10); }),
+  EXPECT_EQ(status_after_change([&](Pieces& p, FileHeader&) { cut_words(*find_piece(p, kSources), 0); }),
             kBadLevel);
-  EXPECT_EQ(status_after_change([&](Pieces& p, FileHeader&) { cut_words(*find_piece(p, kOrder), 0); }),
-            kBadLevel);
-  EXPECT_EQ(status_after_change([&](Pieces& p, FileHeader&) { ++find_piece(p, kOrder)->row.level; }),
+  EXPECT_EQ(status_after_change([&](Pieces& p, FileHeader&) { ++find_piece(p, kSources)->row.level; }),
             kUnknownSection);
   EXPECT_EQ(status_after_change([&](Pieces& p, FileHeader&) { p.push_back(*find_piece(p, kSources)); }),
             kSectionDuplicated);
-  EXPECT_EQ(status_after_change([&](Pieces& p, FileHeader&) { find_piece(p, kOrder)->bytes += '\0'; }),
+  EXPECT_EQ(status_after_change([&](Pieces& p, FileHeader&) { find_piece(p, kSources)->bytes += '\0'; }),
             kSectionSizeMismatch);
 }
 
+// Nobody can know whether a vertex is row 3 or row 200 of an array.
 TEST(CheckRefit, EverySealedChangeIsFoundOrHarmless) {
   Bytes file = refittable();
-  for (const SectionKind kind : {SectionKind::source_vertices, SectionKind::block_order}) {
-    const Section section = file.section(kind);
-    for_each_sealed_change(file, section.offset, section.offset + section.bytes, {0x01u, 0x02u, 0x80u, 0xFFu},
-                           [&](const CheckResult& result) {
-                             // Whether a vertex is row 3 or row 200 of an array nobody can know.
-                             EXPECT_EQ(kind, SectionKind::source_vertices);
-                             EXPECT_EQ(defect_of(result.asset.level()), nullptr);
-                           });
-  }
+  const Section section = file.section(SectionKind::source_vertices);
+  for_each_sealed_change(
+      file, section.offset, section.offset + section.bytes, {0x01u, 0x02u, 0x80u, 0xFFu},
+      [&](const CheckResult& result) { EXPECT_EQ(defect_of(result.asset.level()), nullptr); });
   EXPECT_EQ(file.check_sealed(), kOk);
 }
 

@@ -331,12 +331,11 @@ TEST(CheckLevels, EachIsOnePieceOfTheFile) {
   ASSERT_EQ(result.asset.levels.size(), 3u);
   const std::vector<SectionKind> expected = {SectionKind::blocks,          SectionKind::triangles,
                                              SectionKind::oriented_blocks, SectionKind::topology,
-                                             SectionKind::components,      SectionKind::source_vertices,
-                                             SectionKind::block_order};
+                                             SectionKind::components,      SectionKind::source_vertices};
   for (std::uint32_t i = 0; i < 3; ++i) {
     std::size_t first = 0;
     EXPECT_EQ(kinds_in_order(file, i, first), expected);
-    EXPECT_EQ(first, 1 + 7 * i);
+    EXPECT_EQ(first, 1 + 6 * i);
     EXPECT_EQ(result.asset.level(i).error_bound, i);
     EXPECT_EQ(result.asset.level(i).triangle_count, i == 0 ? 30u : i == 1 ? 15u : 8u);
     EXPECT_EQ(defect_of(result.asset.level(i)), nullptr);

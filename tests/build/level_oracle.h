@@ -291,9 +291,6 @@ inline const char* defect_of_oriented_blocks(const LevelView& level) {
         return "oriented boxes hold the triangles below them";
     }
   }
-  for (std::uint32_t b = 0; b < level.block_count && level.block_order != nullptr; ++b) {
-    if (level.block_order[number[b]] != b) return "the block order names the block of each oriented block";
-  }
   return next == level.block_count ? nullptr : "there are as many oriented blocks as blocks";
 }
 

@@ -75,7 +75,6 @@ class Bytes {
   OrientedBlock* oriented_blocks() { return elements<OrientedBlock>(SectionKind::oriented_blocks); }
   TriangleTopology* topology() { return elements<TriangleTopology>(SectionKind::topology); }
   std::uint32_t* source_vertices() { return elements<std::uint32_t>(SectionKind::source_vertices); }
-  std::uint32_t* block_order() { return elements<std::uint32_t>(SectionKind::block_order); }
   SurfaceComponent* components() { return elements<SurfaceComponent>(SectionKind::components); }
   Triangle* triangles() { return elements<Triangle>(SectionKind::triangles); }
   Part* parts() { return elements<Part>(SectionKind::parts); }

@@ -42,12 +42,10 @@ void expect_same(const LevelView& host, const LevelView& device, Contents conten
     EXPECT_EQ(device.topology, nullptr);
     EXPECT_EQ(device.components, nullptr);
     EXPECT_EQ(device.source_vertices, nullptr);
-    EXPECT_EQ(device.block_order, nullptr);
   } else {
     expect_same_array(host.topology, device.topology, host.triangle_count);
     expect_same_array(host.components, device.components, host.component_count);
     expect_same_array(host.source_vertices, device.source_vertices, host.vertex_count);
-    expect_same_array(host.block_order, device.block_order, host.block_count);
   }
   if (contents == Contents::all)
     expect_same_array(host.blocks, device.blocks, host.block_count);

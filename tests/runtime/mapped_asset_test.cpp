@@ -146,8 +146,7 @@ TEST(LevelViews, AreCopiedWithoutTheOtherLevels) {
           EXPECT_EQ(is_in(pieces, level.oriented_blocks), shown);
           EXPECT_EQ(is_in(pieces, level.blocks), shown && contents == Contents::all);
           for (const void* elements :
-               {static_cast<const void*>(level.topology), static_cast<const void*>(level.source_vertices),
-                static_cast<const void*>(level.block_order)})
+               {static_cast<const void*>(level.topology), static_cast<const void*>(level.source_vertices)})
             EXPECT_EQ(is_in(pieces, elements), shown && contents != Contents::exact_queries);
         }
       }

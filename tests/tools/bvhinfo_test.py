@@ -29,7 +29,7 @@ class Info(ToolTest):
         self.assertEqual((page.returncode, page.stderr), (DONE, b""))
         for word in ("cube.obj", "triangles    12", "1 imaginary", "minimum 1", "0 partial leaf blocks", "depth", "SAH cost",
                      "block pairs", "oriented block pairs", "oriented_blocks", "8 vertices, 1 component, closed", "topology",
-                     "components", "source_vertices", "block_order", "8 source vertices", "bounds", "origin", "sections", "provenance"):
+                     "components", "source_vertices", "8 source vertices", "bounds", "origin", "sections", "provenance"):
             self.assertIn(word, page.stdout.decode())
 
     def test_the_page_sends_no_control_characters_of_a_file_to_a_terminal(self):

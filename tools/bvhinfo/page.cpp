@@ -25,7 +25,6 @@ constexpr std::pair<SectionKind, const char*> kSectionKinds[] = {
     {SectionKind::oriented_blocks, "oriented_blocks"},
     {SectionKind::topology, "topology"},
     {SectionKind::source_vertices, "source_vertices"},
-    {SectionKind::block_order, "block_order"},
     {SectionKind::components, "components"},
 };
 

@@ -690,7 +690,6 @@ public static unsafe class Native {
   public const uint TANDEM_BAD_ROTATION = 171;
   public const uint TANDEM_BAD_ORIENTED_BOX = 172;
   public const uint TANDEM_TRIANGLE_OUTSIDE_ORIENTED_BOX = 173;
-  public const uint TANDEM_BLOCK_ORDER_MISMATCH = 174;
   public const uint TANDEM_BAD_TOPOLOGY = 180;
   public const uint TANDEM_VERTEX_ORDER = 181;
   public const uint TANDEM_VERTEX_MISMATCH = 182;

@@ -20,7 +20,7 @@ _MOST = 0xFFFFFFFF
 # The section table of a .bvh file, version 1 (formats/FORMAT.md).
 _SECTION = np.dtype([("kind", "<u4"), ("level", "<u4"), ("offset", "<u8"), ("bytes", "<u8"), ("count", "<u8")])
 _SECTION_COUNT, _SECTION_TABLE = 96, 128
-_SECTION_KINDS = ("levels", "blocks", "triangles", "parts", "strings", "provenance", "oriented_blocks", "topology", "components", "source_vertices", "block_order")
+_SECTION_KINDS = ("levels", "blocks", "triangles", "parts", "strings", "provenance", "oriented_blocks", "topology", "components", "source_vertices")
 _CORNER = np.dtype([("position", "<f4", 3), ("w", "<u4")])  # of tandem.h
 # The figures of statistics(), in the order of the extension's numbers.
 _TREE = ("triangles", "nodes", "leaf_nodes", "internal_nodes", "imaginary_nodes", "imaginary_minimum", "imaginary_fraction", "leaf_blocks", "internal_blocks",

@@ -25,7 +25,6 @@ constexpr bool is_wanted(SectionKind kind, Contents contents) {
     case SectionKind::topology:
     case SectionKind::components:
     case SectionKind::source_vertices:
-    case SectionKind::block_order:
       return contents != Contents::exact_queries;
     case SectionKind::blocks:
       return contents == Contents::all;

@@ -33,7 +33,6 @@ LevelView copied_level(LevelView level, std::span<const Piece> pieces, Contents 
   copied(level.topology, SectionKind::topology);
   copied(level.components, SectionKind::components);
   copied(level.source_vertices, SectionKind::source_vertices);
-  copied(level.block_order, SectionKind::block_order);
   return level;
 }
 

@@ -49,6 +49,17 @@ inline Mesh welded(const Mesh& mesh) {
   return out;
 }
 
+/// The number of the block that each oriented block belongs to, by the invariant *Numbers* of FORMAT.md.
+inline std::vector<std::uint32_t> blocks_of_oriented(const LevelView& level) {
+  std::vector<std::uint32_t> of = {0};
+  for (std::uint32_t b = 0; b < level.block_count; ++b) {
+    const Block& block = level.blocks[b];
+    for (int i = 0; i < kNodesPerBlock && block.kind[i] == NodeKind::internal; ++i)
+      of.push_back(block.index[i]);
+  }
+  return of;
+}
+
 /// Ways to bend, of which some are wild.
 enum class Bend { twist, fold, shear, wave, flatten, collapse, inside_out, noise, huge, tiny };
 inline constexpr Bend kBends[] = {Bend::twist,    Bend::fold,       Bend::shear, Bend::wave, Bend::flatten,

@@ -71,8 +71,9 @@ void expect_same_elements(const Element* on_gpu, const Element* wanted, std::siz
 /// The oriented blocks of a deformed tree.
 std::vector<OrientedBlock> deformed_oriented(const LevelView& rest, const LevelView& deformed) {
   std::vector<OrientedBlock> out(rest.oriented_blocks, rest.oriented_blocks + rest.block_count);
+  const std::vector<std::uint32_t> block_of = blocks_of_oriented(rest);
   for (std::uint32_t i = 0; i < rest.block_count; ++i) {
-    const Block& block = deformed.blocks[rest.block_order[i]];
+    const Block& block = deformed.blocks[block_of[i]];
     std::memcpy(out[i].centre, block.centre, sizeof block.centre);
     std::memcpy(out[i].half_extent, block.half_extent, sizeof block.half_extent);
     out[i].rotation = kNoRotation;

@@ -23,6 +23,7 @@ struct PlannedRefit {
   const RefitPlans& plans;
   const RefitPlan& plan;
   const std::vector<float>& positions;
+  std::vector<std::uint32_t> block_of;  // of each oriented block
   std::vector<Block> blocks;
   std::vector<Triangle> triangles;
   std::vector<Box> roots;
@@ -36,6 +37,7 @@ struct PlannedRefit {
         plans(all),
         plan(own),
         positions(now),
+        block_of(blocks_of_oriented(level)),
         blocks(level.blocks, level.blocks + level.block_count),
         triangles(level.triangles, level.triangles + level.triangle_count),
         roots(own.roots),
@@ -126,7 +128,7 @@ struct PlannedRefit {
       EXPECT_EQ(own.oriented, kNoIndex);
       return;
     }
-    EXPECT_EQ(rest.block_order[own.oriented], own.block);
+    EXPECT_EQ(block_of[own.oriented], own.block);
     EXPECT_EQ(rest.oriented_blocks[own.oriented].first_below, own.first_below);
   }
 };

@@ -100,9 +100,7 @@ Plan plan_sections(const PartTable& table, const AssetSource& source, std::span<
   std::size_t optional = 0;
   for (const AssetLevel& level : levels)
     optional += (level.oriented_blocks.empty() ? 0 : 1) + (level.topology == nullptr ? 0 : 2) +
-                (!level.can_be_refitted()        ? 0
-                 : level.oriented_blocks.empty() ? 1
-                                                 : 2);
+                (level.can_be_refitted() ? 1 : 0);
   Plan plan(2 * levels.size() + optional + 4);
   plan.add(SectionKind::levels, 0, levels.size(), sizeof(Level));
   for (std::uint32_t i = 0; i < levels.size(); ++i) {
@@ -116,11 +114,8 @@ Plan plan_sections(const PartTable& table, const AssetSource& source, std::span<
       plan.add(SectionKind::topology, i, topology->triangles.size(), sizeof(TriangleTopology));
       plan.add(SectionKind::components, i, topology->components.size(), sizeof(SurfaceComponent));
     }
-    if (levels[i].can_be_refitted()) {
+    if (levels[i].can_be_refitted())
       plan.add(SectionKind::source_vertices, i, levels[i].topology->vertex_count, sizeof(std::uint32_t));
-      if (!levels[i].oriented_blocks.empty())
-        plan.add(SectionKind::block_order, i, levels[i].oriented_blocks.size(), sizeof(std::uint32_t));
-    }
   }
   plan.add(SectionKind::parts, 0, table.parts.size(), sizeof(Part));
   plan.add(SectionKind::strings, 0, table.strings.size(), 1);
@@ -195,8 +190,6 @@ void write_section(const Section& section, const AssetSource& source, std::span<
       return fill(image, section, level.topology->components);
     case SectionKind::source_vertices:
       return fill(image, section, source_vertices(level));
-    case SectionKind::block_order:
-      return fill(image, section, block_order(*level.tree));
     case SectionKind::triangles:
       return write_triangles(level, table.parts, reinterpret_cast<Triangle*>(image.data() + section.offset));
     case SectionKind::parts:

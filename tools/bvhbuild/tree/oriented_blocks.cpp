@@ -374,16 +374,6 @@ class Fit {
 
 }  // namespace
 
-std::vector<std::uint32_t> block_order(const Tree& tree) {
-  std::vector<std::uint32_t> order = {0};
-  order.reserve(tree.blocks.size());
-  for (const Block& block : tree.blocks) {
-    for (int i = 0; i < kNodesPerBlock && block.kind[i] == NodeKind::internal; ++i)
-      order.push_back(block.index[i]);
-  }
-  return order;
-}
-
 std::vector<OrientedBlock> orient_blocks(const Geometry& geometry, const Tree& tree, Effort effort) {
   std::vector<OrientedBlock> out(tree.blocks.size());
   // These are the number of each block, and that of its first child, or of its first triangle.

@@ -65,10 +65,6 @@ Tree build_tree(const Geometry& geometry, Imaginary imaginary, Effort effort, Op
 /// Returns the tree with its boxes made anew, around the triangles where the geometry's points have them.
 Tree refitted(const Geometry& geometry, const Tree& tree);
 
-/// The number of the block that each oriented block belongs to (tandem/formats/oriented_block.h says how they
-/// are numbered).
-std::vector<std::uint32_t> block_order(const Tree& tree);
-
 /// The oriented blocks of a tree, in the order in which they lie in the file: for each block a frame that
 /// fits the triangles below it, searched for as long as `effort` says, and in that frame the boxes of its
 /// nodes. The result does not depend on the number of threads. Condition: fewer than kMostOrientedTriangles.

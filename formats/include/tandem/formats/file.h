@@ -13,7 +13,7 @@ inline constexpr std::uint16_t kVersionMajor = 1;
 inline constexpr std::uint16_t kVersionMinor = 0;
 inline constexpr std::uint64_t kSectionAlignment = 256;
 inline constexpr std::uint32_t kMaxLevels = 32;
-inline constexpr std::uint32_t kMaxSections = 7 * kMaxLevels + 4;
+inline constexpr std::uint32_t kMaxSections = 6 * kMaxLevels + 4;
 
 /// Bytes 0 to 127 of a file. The section table follows.
 ///
@@ -52,9 +52,6 @@ enum class SectionKind : std::uint32_t {
   /// std::uint32_t[], at most one for each level that has topology: the source vertex of each vertex.
   /// Refitting needs it.
   source_vertices = 10,
-  /// std::uint32_t[], one for each level that has oriented blocks and source vertices: the block that each
-  /// oriented block belongs to.
-  block_order = 11,
 };
 
 /// One row of the section table.

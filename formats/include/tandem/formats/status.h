@@ -56,7 +56,6 @@ enum class [[nodiscard]] Status : std::uint32_t{
     kBadRotation,                  ///< a rotation that is no quaternion of whole numbers in their range
     kBadOrientedBox,  ///< a box that is none, that reaches too far, or a size that is not the boxes'
     kTriangleOutsideOrientedBox,  ///< of a node above it
-    kBlockOrderMismatch,          ///< the block order names another block than an oriented block's own
     // The topology.
     kBadTopology = 180,  ///< a vertex out of range, an unknown flag set, or a component that is none
     kVertexOrder,        ///< vertices are not numbered by first appearance

@@ -22,8 +22,7 @@ struct LevelView {
   const TriangleTopology* topology = nullptr;      ///< triangle_count of them, or null: the file has none
   const SurfaceComponent* components = nullptr;    ///< component_count of them; null where topology is
   const std::uint32_t* source_vertices = nullptr;  ///< of each vertex; null: the level cannot be refitted
-  const std::uint32_t* block_order = nullptr;  ///< block of each oriented block; null without either of both
-  const PreciseCorners* precise = nullptr;     ///< of each triangle of a deformed tree; null: as stored
+  const PreciseCorners* precise = nullptr;         ///< of each triangle of a deformed tree; null: as stored
   std::uint32_t block_count = 0;
   std::uint32_t triangle_count = 0;
   std::uint32_t leaf_block_count = 0;

@@ -220,7 +220,8 @@ Status ConfigurationQuery::answer(SceneState& scene, const ConfigurationOptions&
     const std::uint32_t body = options.bodies[refused % moving];
     return scene.fail(scene.posed({scene.instances[body].asset, options.poses[refused]}, tree, box), refused);
   }
-  counters_.configurations = count;
+  rows_.clear();
+  counters_ = {count, 0, 0, 0};
   for (std::uint32_t i = 0; i < workers; ++i) {
     State::Worker& worker = state->workers[i];
     bool enough_memory = worker.enough_memory;
@@ -236,11 +237,7 @@ Status ConfigurationQuery::answer(SceneState& scene, const ConfigurationOptions&
 }
 
 Status ConfigurationQuery::find(Scene& in, const ConfigurationOptions& options) {
-  static_cast<void>(forget(Status::kOk));
-  SceneState* const scene = in.state();
-  if (scene == nullptr) return Status::kOutOfMemory;
-  const Status status = answer(*scene, options);
-  return status == Status::kOk ? status : forget(status);
+  return ask_scene(in, [&](SceneState& scene) { return answer(scene, options); });
 }
 
 }  // namespace tandem

@@ -333,12 +333,10 @@ Status ClosestQuery::answer(SceneState& scene, const ClosestOptions& options) {
 }
 
 Status ClosestQuery::find(Scene& in, const ClosestOptions& options) {
-  static_cast<void>(forget(Status::kOk));
-  SceneState* const scene = in.state();
-  if (scene == nullptr) return Status::kOutOfMemory;
-  Status status = check(*scene, options);
-  if (status == Status::kOk) status = answer(*scene, options);
-  return status == Status::kOk ? status : forget(status);
+  return ask_scene(in, [&](SceneState& scene) {
+    const Status status = check(scene, options);
+    return status == Status::kOk ? answer(scene, options) : status;
+  });
 }
 
 }  // namespace tandem

@@ -262,12 +262,10 @@ Status RayQuery::answer(SceneState& scene, const RayOptions& options) {
 }
 
 Status RayQuery::find(Scene& in, const RayOptions& options) {
-  static_cast<void>(forget(Status::kOk));
-  SceneState* const scene = in.state();
-  if (scene == nullptr) return Status::kOutOfMemory;
-  Status status = check(*scene, options);
-  if (status == Status::kOk) status = answer(*scene, options);
-  return status == Status::kOk ? status : forget(status);
+  return ask_scene(in, [&](SceneState& scene) {
+    const Status status = check(scene, options);
+    return status == Status::kOk ? answer(scene, options) : status;
+  });
 }
 
 }  // namespace tandem

@@ -10,7 +10,7 @@ namespace tandem {
 
 /// A tree of world boxes: items and groups of four over them; level 0 holds the items' boxes.
 struct BoxTree {
-  static constexpr int kGroup = 4;
+  static constexpr int kGroup = 4, kMostLevels = 17;
 
   /// A box on its way to its place in the tree.
   struct Item {
@@ -37,10 +37,10 @@ struct BoxTree {
     Kind of[kGroup];
   };
 
-  Buffer<Item> items;                // in the order of the tree
-  Buffer<Group> groups;              // level by level
-  Buffer<Kinds> kinds;               // of the groups, where the filter tells instances apart; else none
-  std::size_t level_begin[17] = {};  // where each level of groups begins
+  Buffer<Item> items;    // in the order of the tree
+  Buffer<Group> groups;  // level by level
+  Buffer<Kinds> kinds;   // of the groups, where the filter tells instances apart; else none
+  std::size_t level_begin[kMostLevels] = {};  // where each level of groups begins
   int levels = 0;
 
   bool reserve(std::size_t boxes, const PairFilter& filter);

@@ -14,6 +14,7 @@ struct ManifoldLanes;
 struct RefitTree;
 struct RefitSurfaces;
 struct RayTask;
+struct RayStream;
 struct PointTask;
 
 /// The functions that are compiled once for each width of vectors.
@@ -25,6 +26,7 @@ struct LaneVariant {
   const ManifoldLanes* manifold_lanes;
   RefitSurfaces (*refit)(const RefitTree&, const float*);
   void (*ray_walk)(RayTask&);
+  void (*ray_stream_walk)(const RayStream&);
   void (*point_walk)(PointTask&);
 };
 

@@ -6,6 +6,7 @@
 #include "kernels/common/check_options.h"
 #include "kernels/contact/first_contact.h"
 #include "kernels/distance/pair_distance.h"
+#include "kernels/scene/body_visit.h"
 #include "kernels/scene/scene_state.h"
 
 namespace tandem {
@@ -168,8 +169,7 @@ bool ConfigurationQuery::State::meet(const SceneState& scene, const Configuratio
   }
   for (std::uint32_t i = 0; i < bodies.size() && standing.kept_of() != 0; ++i) {
     const WorldBox& box = worker.boxes[i];
-    standing.kept().visit(box, [&](std::size_t place) {
-      const std::uint32_t other = standing.kept().items[place].box;
+    standing.kept().visit(box, [&](std::uint32_t other) {
       if (!filter.looks_at(bodies[i], other)) return;
       enough_memory = enough_memory &&
                       worker.candidates.push(candidate_of(worker.trees[i], scene.bodies[other],
@@ -252,8 +252,7 @@ void ConfigurationQuery::State::find_nearest(const SceneState& scene, const Conf
   for (const Candidate& candidate : worker.candidates.view()) look_at(candidate);
   for (std::uint32_t i = 0; i < bodies.size() && standing.kept_of() != 0; ++i) {
     const auto gap = [&](const WorldBox& box) { return distance_between(worker.boxes[i], box); };
-    standing.kept().visit_nearest(gap, limit, [&](std::size_t place) {
-      const std::uint32_t other = standing.kept().items[place].box;
+    visit_nearest(standing.kept(), gap, limit, [&](std::uint32_t other) {
       const Candidate candidate = standing_one(i, other);
       if (candidate.bodies != former && filter.looks_at(bodies[i], other)) look_at(candidate);
     });
@@ -312,7 +311,8 @@ Status ConfigurationQuery::answer(SceneState& scene, const ConfigurationOptions&
     const std::uint32_t body = options.bodies[refused % moving];
     return scene.fail(scene.posed({scene.instances[body].asset, options.poses[refused]}, tree, box), refused);
   }
-  counters_.configurations = count;
+  rows_.clear();
+  counters_ = {count, 0, 0, 0};
   for (std::uint32_t i = 0; i < workers; ++i) {
     State::Worker& worker = state->workers[i];
     bool enough_memory = worker.enough_memory;
@@ -328,11 +328,7 @@ Status ConfigurationQuery::answer(SceneState& scene, const ConfigurationOptions&
 }
 
 Status ConfigurationQuery::find(Scene& in, const ConfigurationOptions& options) {
-  static_cast<void>(forget(Status::kOk));
-  SceneState* const scene = in.state();
-  if (scene == nullptr) return Status::kOutOfMemory;
-  const Status status = answer(*scene, options);
-  return status == Status::kOk ? status : forget(status);
+  return ask_scene(in, [&](SceneState& scene) { return answer(scene, options); });
 }
 
 }  // namespace tandem

@@ -188,15 +188,13 @@ Status ContainmentQuery::answer(SceneState& scene, std::span<const Contact> cont
 // query: that has found the contacts, or null.
 Status ContainmentQuery::ask(Scene& in, std::span<const ObjectPair> pairs, std::span<const Contact> contacts,
                              const ContactQuery* query) {
-  SceneState* const scene = in.state();
-  if (scene == nullptr) return forget(Status::kOutOfMemory);
-  const DeviceMemory* const on_device = query != nullptr ? query->on_device_of(*scene) : nullptr;
-  Status status = scene->require_topology();
-  if (status == Status::kOk) status = scene->take_pairs(pairs, pairs_);
-  if (status == Status::kOk) {
-    status = on_device != nullptr ? scene->ask_device(*on_device, found()) : answer(*scene, contacts);
-  }
-  return status == Status::kOk ? status : forget(status);
+  return ask_scene(in, [&](SceneState& scene) {
+    const DeviceMemory* const on_device = query != nullptr ? query->on_device_of(scene) : nullptr;
+    Status status = scene.require_topology();
+    if (status == Status::kOk) status = scene.take_pairs(pairs, pairs_);
+    if (status != Status::kOk) return status;
+    return on_device != nullptr ? scene.ask_device(*on_device, found()) : answer(scene, contacts);
+  });
 }
 
 Status ContainmentQuery::find(Scene& scene, std::span<const ObjectPair> pairs,

@@ -1,5 +1,7 @@
 #pragma once
+#include <bit>
 #include <cmath>
+#include <cstdint>
 
 #include "kernels/geometry/box_distance.h"
 #include "kernels/geometry/ray_triangle.h"
@@ -28,23 +30,30 @@
 /// **Rays.** The direction is scaled by a power of two so that its largest coordinate is from 1 to 2, which
 /// multiplies parameters by another. What reaches the body's box, in float64 with `margin` for all errors,
 /// runs from tau_0 to tau_1; the float32 ray begins at tau_0, so that no coordinate is larger than the
-/// body's. A point of the ray at tau_0 + tau is o + tau d in float32 numbers, off by at most a_i + length
-/// b_i, a and b being the errors of o and d. A coordinate of d below 2^-60 becomes 2^-60, so that its inverse
-/// is finite; b has the difference.
+/// body's. A ray takes one bound for all three axes: n is the largest sum of |N_ij| along a row, f the
+/// largest |p - t|_j.
+/// - The origin's image is off by at most 4.1 u' n f, the direction's by 8.2 u' n, as its coordinates are
+///   below 2.
+/// - A coordinate of the direction's image below 2^-60 becomes 2^-60, so that its inverse is finite: 2^-60
+///   more.
+/// - The image of the point at tau_0 has two roundings, of at most u' (n f + 4 n tau_0) each.
+/// - As float32 numbers, o is off by at most 1.01 u of its largest coordinate more, and d likewise.
+/// The sums are a and b: a point of the ray at tau_0 + tau is o + tau d in float32 numbers, off by at most a
+/// + length b.
 ///
 /// Box test: with m = (c - o) / d and r = (h + slack) / |d|, the ray is in the box from m - r to m + r along
 /// each axis. m as computed is off by 3.1 u |c - o| / |d|, r by 3.1 u of itself, and each difference by u
 /// (|m| + r). In coordinates, multiplied by |d|, that is below 4.2 u (|c - o| + h + slack) <= 4.2 u (reach +
-/// |o| + slack): slack_i = 1.001 (error_i + a_i + length b_i) + 4.3 u (reach_i + |o_i|). So if a triangle
-/// below a node has a point of the ray at tau, the largest of the lower ends as computed is at most tau, and
-/// the least of the upper ends at least tau.
+/// |o| + slack). With the largest of all axes, slack = 1.001 (error + a + length b) + 4.3 u (reach + |o|). So
+/// if a triangle below a node has a point of the ray at tau, the largest of the lower ends as computed is at
+/// most tau, and the least of the upper ends at least tau.
 ///
 /// Triangle test: w_i of ray_triangle.h, of corners less o, in float32. A coordinate of p_i = v_i - o is off
-/// by at most E = max(error_k + a_k) and u |p|; one of an edge by 2 S = 2 max error_k and u |e|; one of d by
-/// B = max b_k. With P, e and D the largest magnitudes of coordinates, or bounds of them, D_1 >= sum |d_k|, a
-/// coordinate of p x e is off by at most 2 ((u P + E) e + P (u e + 2 S) + (u P + E) (u e + 2 S)) for its
-/// factors and 3.1 u 2 P e for its rounding; and w by D_1 times that, B 3 (2 P e) for d, and 3.1 u D_1 2 P e
-/// for rounding. All together, below
+/// by at most E = error + a and u |p|; one of an edge by 2 S, S = error, and u |e|; one of d by B = b. With
+/// P, e and D the largest magnitudes of coordinates, or bounds of them, D_1 >= sum |d_k|, a coordinate of p x
+/// e is off by at most 2 ((u P + E) e + P (u e + 2 S) + (u P + E) (u e + 2 S)) for its factors and 3.1 u 2 P
+/// e for its rounding; and w by D_1 times that, B 3 (2 P e) for d, and 3.1 u D_1 2 P e for rounding. All
+/// together, below
 ///
 ///     e ((17 u D_1 + 6.1 B) P + 2.1 D_1 E) + 4.3 D_1 S (P + E).
 ///
@@ -57,9 +66,10 @@ struct LocalFrame : FrameLengths {
   double translation[3];
   double error[3];
   double reach[3];
-  double lower[3], upper[3];  ///< bounds of the images of posed vertices
-  float largest_error;        ///< S
-  bool in_range;              ///< float32 can take the body
+  double lower[3], upper[3];      ///< bounds of the images of posed vertices
+  double most_reach, most_error;  ///< of the three axes
+  double row_sum;                 ///< n, rounded up
+  bool in_range;                  ///< float32 can take the body
 };
 
 TANDEM_HD inline LocalFrame local_frame(const Pose& pose, const TreeExtent& extent, const float (&lower)[3],
@@ -68,7 +78,7 @@ TANDEM_HD inline LocalFrame local_frame(const Pose& pose, const TreeExtent& exte
   LocalFrame out;
   relative_pose_detail::invert(pose.rotation, out.inverse);
   out.in_range = bound_lengths(out.inverse, 0, out);
-  double largest = 0;
+  out.most_reach = out.most_error = out.row_sum = 0;
   for (int i = 0; i < 3; ++i) {
     out.translation[i] = pose.translation[i];
     out.reach[i] = extent.reach[i];
@@ -85,23 +95,21 @@ TANDEM_HD inline LocalFrame local_frame(const Pose& pose, const TreeExtent& exte
     out.error[i] *= 1 + 0x1p-40;
     out.lower[i] = static_cast<double>(lower[i]) - out.error[i];
     out.upper[i] = static_cast<double>(upper[i]) + out.error[i];
-    if (!(out.error[i] <= largest)) largest = out.error[i];
+    const double sum =
+        (std::fabs(out.inverse[i][0]) + std::fabs(out.inverse[i][1])) + std::fabs(out.inverse[i][2]);
+    if (!(sum <= out.row_sum)) out.row_sum = sum * (1 + 0x1p-40);
+    if (!(out.error[i] <= out.most_error)) out.most_error = out.error[i];
+    if (!(out.reach[i] <= out.most_reach)) out.most_reach = out.reach[i];
     out.in_range = out.in_range && extent.reach[i] <= kLargestInFrame / 4;
   }
-  out.in_range = out.in_range && largest <= kLargestInFrame / 4;
-  out.largest_error = out.in_range ? static_cast<float>(largest * (1 + 0x1p-20)) : INFINITY;
+  out.in_range = out.in_range && out.most_error <= kLargestInFrame / 4;
   return out;
 }
 
-/// N v, v a difference of float64 numbers with one rounding, and the bound of its error.
-TANDEM_HD inline void take_image(const LocalFrame& frame, const double (&v)[3], double (&out)[3],
-                                 double (&error)[3]) {
-  for (int i = 0; i < 3; ++i) {
-    const double x = frame.inverse[i][0] * v[0], y = frame.inverse[i][1] * v[1],
-                 z = frame.inverse[i][2] * v[2];
-    out[i] = (x + y) + z;
-    error[i] = 4.1 * 0x1p-53 * ((std::fabs(x) + std::fabs(y)) + std::fabs(z)) + 0x1p-990;
-  }
+/// N v.
+TANDEM_HD inline void take_image(const LocalFrame& frame, const double (&v)[3], double (&out)[3]) {
+  for (int i = 0; i < 3; ++i)
+    out[i] = (frame.inverse[i][0] * v[0] + frame.inverse[i][1] * v[1]) + frame.inverse[i][2] * v[2];
 }
 
 /// A point as float32 has it in a body's frame.
@@ -112,14 +120,19 @@ struct LocalPoint {
 
 /// False: float32 cannot take it.
 TANDEM_HD inline bool local_point(const LocalFrame& frame, const double (&p)[3], LocalPoint& out) {
-  double v[3], image[3], error[3], largest = 0;
+  double v[3], image[3], largest = 0;
   for (int k = 0; k < 3; ++k) v[k] = p[k] - frame.translation[k];
-  take_image(frame, v, image, error);
+  take_image(frame, v, image);
   bool in_range = frame.in_range;
   for (int k = 0; k < 3; ++k) {
     in_range = in_range && std::fabs(image[k]) <= kLargestInFrame / 4;
     const float q = in_range ? static_cast<float>(image[k]) : 0;
-    const double off = frame.error[k] + std::fabs(image[k] - static_cast<double>(q)) + error[k];
+    const double error =
+        4.1 * 0x1p-53 *
+            ((std::fabs(frame.inverse[k][0] * v[0]) + std::fabs(frame.inverse[k][1] * v[1])) +
+             std::fabs(frame.inverse[k][2] * v[2])) +
+        0x1p-990;
+    const double off = frame.error[k] + std::fabs(image[k] - static_cast<double>(q)) + error;
     const double slack =
         1.001 * off + 2.1 * 0x1p-24 * (frame.reach[k] + std::fabs(static_cast<double>(q))) + 0x1p-60;
     out.q[k] = q;
@@ -133,10 +146,17 @@ TANDEM_HD inline bool local_point(const LocalFrame& frame, const double (&p)[3],
 /// A ray of the world, ready for bodies.
 struct WorldRay {
   double origin[3], direction[3];
-  double scaled[3];  ///< the direction times `factor`
-  double factor;     ///< a power of two; a parameter is one of the scaled ray times this
+  double scaled[3];   ///< the direction times `factor`
+  double inverse[3];  ///< 1 / scaled
+  double factor;      ///< a power of two; a parameter is one of the scaled ray times this
   double reach;
 };
+
+/// The power of two that takes a positive float64 number to [1, 2), or subnormal ones to less.
+TANDEM_HD inline double scale_to_one(double x) {
+  const auto exponent = static_cast<int>(std::bit_cast<std::uint64_t>(x) >> 52);
+  return std::bit_cast<double>(static_cast<std::uint64_t>(2046 - (exponent > 1 ? exponent : 1)) << 52);
+}
 
 TANDEM_HD inline WorldRay world_ray(const double* origin, const double* direction, double reach) {
   WorldRay ray;
@@ -144,48 +164,57 @@ TANDEM_HD inline WorldRay world_ray(const double* origin, const double* directio
     ray.origin[k] = origin[k];
     ray.direction[k] = direction[k];
   }
-  const double largest = ray::largest_of(ray.direction);
-  ray.factor = std::ldexp(1.0, -std::ilogb(largest));
-  if (!(ray.factor <= 0x1p1022)) ray.factor = 0x1p1022;  // of subnormal numbers
+  ray.factor = scale_to_one(ray::largest_of(ray.direction));
   for (int k = 0; k < 3; ++k) {
     ray.scaled[k] = direction[k] * ray.factor;
     // Only what is exactly 0 stays so.
     if (ray.scaled[k] == 0 && direction[k] != 0) ray.scaled[k] = direction[k] > 0 ? 0x1p-1000 : -0x1p-1000;
+    ray.inverse[k] = 1 / ray.scaled[k];
   }
   ray.reach = reach;
   return ray;
 }
 
-/// Returns whether a ray may meet a box: the parameters are bounds of the part of the scaled ray that does.
-/// Rounded outward: quotients of differences have three roundings, and 2^-50 is spared. A ray whose
-/// coordinate does not change along an axis is compared with the box there.
-TANDEM_HD inline bool meets_box(const double (&origin)[3], const double (&direction)[3], const double* lo,
-                                const double* hi, double& first, double& last) {
+/// Takes the part of a ray that an interval along an axis leaves, before rounding.
+TANDEM_HD inline void cut_to_slab(double origin, double inverse, double lo, double hi, double& near,
+                                  double& far) {
+  const double from = (lo - origin) * inverse, to = (hi - origin) * inverse;
+  const double less = from < to ? from : to, more = from < to ? to : from;
+  near = near < less ? less : near;
+  far = more < far ? more : far;
+}
+
+/// Rounds the part outward. A bound along an axis has three roundings, and 2^-50 is spared; rounding keeps
+/// the order of numbers, so that the largest is rounded in place of each. Returns whether anything is left of
+/// first to last, which are made to be that.
+TANDEM_HD inline bool leaves_part(double near, double far, double& first, double& last) {
+  near = near * (near > 0 ? 1 - 0x1p-50 : 1 + 0x1p-50) - 0x1p-1000;
+  far = far * (far > 0 ? 1 + 0x1p-50 : 1 - 0x1p-50) + 0x1p-1000;
+  first = first < near ? near : first;
+  last = far < last ? far : last;
+  return first <= last;
+}
+
+/// Returns whether a ray may meet a box: the parameters are bounds of the part of the scaled ray that does. A
+/// ray whose coordinate does not change along an axis is compared with the box there.
+TANDEM_HD inline bool meets_box(const WorldRay& ray, const double* lo, const double* hi, double& first,
+                                double& last) {
+  double near = -HUGE_VAL, far = HUGE_VAL;
   for (int k = 0; k < 3; ++k) {
-    if (std::fabs(direction[k]) < 0x1p-900) {
+    if (std::fabs(ray.scaled[k]) < 0x1p-900) {
       // Along the whole ray, up to 2^1000, it moves by less than 2^100.
-      if (direction[k] == 0 && !(lo[k] <= origin[k] && origin[k] <= hi[k])) return false;
+      if (ray.scaled[k] == 0 && !(lo[k] <= ray.origin[k] && ray.origin[k] <= hi[k])) return false;
       continue;
     }
-    const double inverse = 1 / direction[k];
-    double from = (lo[k] - origin[k]) * inverse, to = (hi[k] - origin[k]) * inverse;
-    if (inverse < 0) {
-      const double t = from;
-      from = to, to = t;
-    }
-    from *= from > 0 ? 1 - 0x1p-50 : 1 + 0x1p-50;
-    to *= to > 0 ? 1 + 0x1p-50 : 1 - 0x1p-50;
-    from -= 0x1p-1000;
-    to += 0x1p-1000;
-    if (from > first) first = from;
-    if (to < last) last = to;
+    cut_to_slab(ray.origin[k], ray.inverse[k], lo[k], hi[k], near, far);
   }
-  return first <= last;
+  return leaves_part(near, far, first, last);
 }
 
 /// A ray as float32 has it in a body's frame.
 struct LocalRay {
-  float o[3], d[3], inverse[3], slack[3];
+  float o[3], d[3], inverse[3];
+  float slack;                     ///< of the box test, along every axis
   float length;                    ///< tau_1 - tau_0, rounded up
   float edge_factor, least_bound;  ///< of the triangle test: least_bound + edge_factor e
   double start;                    ///< tau_0
@@ -210,51 +239,43 @@ TANDEM_HD inline float local_limit(const WorldRay& world, const LocalRay& ray, d
 TANDEM_HD inline RayReach local_ray(const LocalFrame& frame, const WorldRay& world, double last,
                                     LocalRay& out) {
   if (!frame.in_range) return RayReach::out_of_range;
-  double v[3], o[3], o_error[3], d[3], d_error[3], scaled[3];
-  double far = 0, reach = 0;
-  for (int k = 0; k < 3; ++k) {
-    v[k] = world.origin[k] - frame.translation[k];
-    scaled[k] = world.scaled[k];
-    if (!(std::fabs(v[k]) <= far)) far = std::fabs(v[k]);
-    if (frame.reach[k] > reach) reach = frame.reach[k];
-  }
-  if (!(far <= 0x1p200 && ray::largest_of(scaled) >= 1)) return RayReach::out_of_range;
-  take_image(frame, v, o, o_error);
-  take_image(frame, scaled, d, d_error);
+  double v[3], o[3], d[3];
+  for (int k = 0; k < 3; ++k) v[k] = world.origin[k] - frame.translation[k];
+  const double far = ray::largest_of(v);
+  if (!(far <= 0x1p200 && ray::largest_of(world.scaled) >= 1)) return RayReach::out_of_range;
+  take_image(frame, v, o);
+  take_image(frame, world.scaled, d);
+  const double o_error = 4.2 * 0x1p-53 * frame.row_sum * far + 0x1p-990;
+  const double d_error = 8.4 * 0x1p-53 * frame.row_sum + 0x1p-59;
   // The largest coordinate of d is above 1/2, so what is in the body's box has parameters below this.
-  const double most = 8 * (far + reach);
-  double lo[3], hi[3], start = 0, end = last / world.factor;
+  const double size = far + frame.most_reach, most = 8 * size;
+  const double margin = 1.01 * (o_error + most * d_error) + 0x1p-46 * size + 0x1p-100;
+  double near = -HUGE_VAL, beyond = HUGE_VAL, start = 0, end = last / world.factor;
   if (!(end <= most)) end = most;
   for (int k = 0; k < 3; ++k) {
-    const double margin = 1.01 * (o_error[k] + most * d_error[k]) + 0x1p-46 * (far + reach) + 0x1p-100;
-    if (std::fabs(d[k]) < 0x1p-60) d[k] = d[k] < 0 ? -0x1p-60 : 0x1p-60, d_error[k] += 0x1p-59;
-    const double wide = margin + most * (d_error[k]);
-    lo[k] = frame.lower[k] - wide;
-    hi[k] = frame.upper[k] + wide;
+    if (std::fabs(d[k]) < 0x1p-60) d[k] = d[k] < 0 ? -0x1p-60 : 0x1p-60;
+    cut_to_slab(o[k], 1 / d[k], frame.lower[k] - margin, frame.upper[k] + margin, near, beyond);
   }
-  if (!meets_box(o, d, lo, hi, start, end)) return RayReach::misses;
+  if (!leaves_part(near, beyond, start, end)) return RayReach::misses;
   const double length = (end - start) * (1 + 0x1p-40) + 0x1p-60;
-  double d_1 = 0, off = 0, d_off = 0, largest = 0;
+  double largest_o = 0, largest_d = 0, d_1 = 0;
   for (int k = 0; k < 3; ++k) {
-    const double from = o[k] + start * d[k];
-    out.o[k] = static_cast<float>(from);
+    out.o[k] = static_cast<float>(o[k] + start * d[k]);
     out.d[k] = static_cast<float>(d[k]);
     out.inverse[k] = 1 / out.d[k];
-    const double a = std::fabs(from - static_cast<double>(out.o[k])) + o_error[k] + start * d_error[k] +
-                     4 * 0x1p-53 * (std::fabs(o[k]) + start * std::fabs(d[k]));
-    const double b = std::fabs(d[k] - static_cast<double>(out.d[k])) + d_error[k];
-    const double size = frame.reach[k] + std::fabs(static_cast<double>(out.o[k]));
-    const double slack = 1.001 * (frame.error[k] + a + length * b) + 4.3 * 0x1p-24 * size + 0x1p-60;
-    out.slack[k] = static_cast<float>(slack * (1 + 0x1p-20));
-    d_1 += std::fabs(d[k]);
-    if (frame.error[k] + a > off) off = frame.error[k] + a;
-    if (b > d_off) d_off = b;
-    if (size > largest) largest = size;
+    const double o_size = std::fabs(static_cast<double>(out.o[k])), d_size = std::fabs(d[k]);
+    largest_o = largest_o < o_size ? o_size : largest_o;
+    largest_d = largest_d < d_size ? d_size : largest_d;
+    d_1 += d_size;
   }
+  const double a = 1.01 * 0x1p-24 * largest_o + (o_error + start * d_error) +
+                   0x1p-51 * frame.row_sum * (far + 4 * start) + 0x1p-120;
+  const double b = 1.01 * 0x1p-24 * largest_d + d_error;
+  const double off = frame.most_error + a, reach = frame.most_reach + largest_o;
   if (!(off <= kLargestInFrame && length <= kLargestInFrame)) return RayReach::out_of_range;
-  const double s = static_cast<double>(frame.largest_error);
-  out.edge_factor = rounded_up(1.001 * ((17 * 0x1p-24 * d_1 + 6.1 * d_off) * largest + 2.1 * d_1 * off));
-  out.least_bound = rounded_up(1.001 * 4.3 * d_1 * s * (largest + off) + 0x1p-70);
+  out.slack = rounded_up(1.001 * (off + length * b) + 4.3 * 0x1p-24 * reach + 0x1p-60);
+  out.edge_factor = rounded_up(1.001 * ((17 * 0x1p-24 * d_1 + 6.1 * b) * reach + 2.1 * d_1 * off));
+  out.least_bound = rounded_up(1.001 * 4.3 * d_1 * frame.most_error * (reach + off) + 0x1p-70);
   out.length = rounded_up(length);
   out.start = start;
   return RayReach::in_frame;

@@ -14,18 +14,18 @@ bool contains(const WorldBox& box, const std::array<double, 3>& point) {
 }  // namespace
 
 Status BodiesAtQuery::find(Scene& in, const BodiesAtOptions& options) {
-  static_cast<void>(forget(Status::kOk));
-  SceneState* const scene = in.state();
-  if (scene == nullptr) return Status::kOutOfMemory;
-  for (std::uint32_t p = 0; p < options.points.size(); ++p) {
-    if (!is_in_range(options.points[p])) return forget(scene->fail(Status::kOutOfRange, p));
-    for (std::uint32_t body = 0; body < scene->boxes.size(); ++body) {
-      if (contains(scene->boxes[body], options.points[p]) && !rows_.push({p, body}))
-        return forget(scene->fail(Status::kOutOfMemory, p));
+  return ask_scene(in, [&](SceneState& scene) {
+    rows_.clear();
+    for (std::uint32_t p = 0; p < options.points.size(); ++p) {
+      if (!is_in_range(options.points[p])) return scene.fail(Status::kOutOfRange, p);
+      for (std::uint32_t body = 0; body < scene.boxes.size(); ++body) {
+        if (contains(scene.boxes[body], options.points[p]) && !rows_.push({p, body}))
+          return scene.fail(Status::kOutOfMemory, p);
+      }
     }
-  }
-  counters_ = {options.points.size(), options.points.size() * scene->boxes.size()};
-  return Status::kOk;
+    counters_ = {options.points.size(), options.points.size() * scene.boxes.size()};
+    return Status::kOk;
+  });
 }
 
 }  // namespace tandem

@@ -300,8 +300,12 @@ Status ClosestQuery::answer(SceneState& scene, const ClosestOptions& options) {
   if (status != Status::kOk) return status;
   const std::uint32_t workers = scene.workers_for(count, kProbesAtOnce);
   if (!scene.threads.provide(workers)) return scene.fail(Status::kCannotStartThread, 0);
-  const auto place = [&](std::size_t i, double* out) { std::copy_n(options.points[i].data(), 3, out); };
-  if (!state.searches.provide(workers) || !state.order.make<3>(count, place) || !rows_.resize(count))
+  const auto place = [&](std::uint32_t i, double* out) {
+    std::copy_n(options.points[i].data(), 3, out);
+    return true;
+  };
+  if (!state.searches.provide(workers) || !state.order.make(0, static_cast<std::uint32_t>(count), place) ||
+      !rows_.resize(count))
     return scene.fail(Status::kOutOfMemory, 0);
   for (std::uint32_t i = 0; i < workers; ++i) {
     ClosestSearch& search = state.searches[i];
@@ -333,12 +337,10 @@ Status ClosestQuery::answer(SceneState& scene, const ClosestOptions& options) {
 }
 
 Status ClosestQuery::find(Scene& in, const ClosestOptions& options) {
-  static_cast<void>(forget(Status::kOk));
-  SceneState* const scene = in.state();
-  if (scene == nullptr) return Status::kOutOfMemory;
-  Status status = check(*scene, options);
-  if (status == Status::kOk) status = answer(*scene, options);
-  return status == Status::kOk ? status : forget(status);
+  return ask_scene(in, [&](SceneState& scene) {
+    const Status status = check(scene, options);
+    return status == Status::kOk ? answer(scene, options) : status;
+  });
 }
 
 }  // namespace tandem

@@ -134,6 +134,13 @@ inline void fetch_block([[maybe_unused]] const Block* block) {
 #endif
 }
 
+inline void fetch_triangles([[maybe_unused]] const Triangle* triangles) {
+#ifdef TANDEM_HAVE_LANES
+  for (std::size_t i = 0; i < 4 * sizeof(Triangle); i += 64)
+    __builtin_prefetch(reinterpret_cast<const char*>(triangles) + i);
+#endif
+}
+
 /// Pushes the nodes of the mask, the nearest last.
 template <typename Four>
 inline void push_nodes(const Block* blocks, const Block& block, const Four& near, unsigned mask,
@@ -152,51 +159,65 @@ inline void push_nodes(const Block* blocks, const Block& block, const Four& near
 template <typename Four>
 class RayWalkBy {
  public:
-  explicit RayWalkBy(RayTask& task) : task_(task) {
+  /// Begins with task().
+  void begin() {
     for (int k = 0; k < 3; ++k) {
-      o_[k] = Four{} + task.ray.o[k];
-      inverse_[k] = Four{} + task.ray.inverse[k];
+      o_[k] = Four{} + task_.ray.o[k];
+      inverse_[k] = Four{} + task_.ray.inverse[k];
       size_[k] = magnitude(inverse_[k]);
-      slack_[k] = Four{} + task.ray.slack[k];
     }
+    slack_ = Four{} + task_.ray.slack;
+    height_ = block_number_ = leaf_mask_ = 0;
+    limit_ = task_.limit;
   }
 
-  void run() {
-    WaitingNode stack[kMostWaitingNodes];
-    std::uint32_t height = 0, block_number = 0;
-    float limit = task_.limit;
-    while (true) {
-      const Block& block = task_.tree->blocks[block_number];
-      ++task_.blocks;
-      Four near;
-      unsigned mask = nodes(block, limit, near);
-      if (mask != 0) {
-        if (block.is_leaf_block()) {
-          limit = take(block, mask, near, limit);
-          if (limit < 0) return;
-        } else {
-          if ((mask & (mask - 1)) == 0) {
-            block_number = block.index[lowest_bit(mask)];
-            continue;
-          }
-          push_nodes(task_.tree->blocks, block, near, mask, stack, height);
-        }
-      }
-      do {
-        if (height == 0) return;
-        --height;
-      } while (stack[height].near > limit);
-      block_number = stack[height].block;
+  RayTask& task() { return task_; }
+
+  /// Looks at one block, or at the triangles of one. False: there is no other.
+  bool step() {
+    if (leaf_mask_ != 0) {
+      take();
+      return limit_ >= 0 && pop();
     }
+    const Block& block = task_.tree->blocks[block_number_];
+    ++task_.blocks;
+    Four near;
+    const unsigned mask = nodes(block, near);
+    if (mask == 0) return pop();
+    if (block.is_leaf_block()) {
+      const Triangle* const triangles = task_.tree->triangles + block.index[0];
+      fetch_triangles(triangles);
+      leaf_mask_ = mask;
+      leaf_near_ = near;
+      return true;
+    }
+    if ((mask & (mask - 1)) == 0) {
+      block_number_ = block.index[lowest_bit(mask)];
+      fetch_block(task_.tree->blocks + block_number_);
+      return true;
+    }
+    push_nodes(task_.tree->blocks, block, near, mask, stack_, height_);
+    block_number_ = stack_[--height_].block;
+    return true;
   }
 
  private:
+  /// The next block that waits and counts. False: none.
+  bool pop() {
+    do {
+      if (height_ == 0) return false;
+      --height_;
+    } while (stack_[height_].near > limit_);
+    block_number_ = stack_[height_].block;
+    return true;
+  }
+
   /// The nodes that the ray may meet up to the limit, and where at the earliest.
-  unsigned nodes(const Block& block, float limit, Four& near) const {
-    Four first{}, last = Four{} + limit;
+  unsigned nodes(const Block& block, Four& near) const {
+    Four first{}, last = Four{} + limit_;
     for (int k = 0; k < 3; ++k) {
       const Four m = (load_four<Four>(block.centre[k]) - o_[k]) * inverse_[k];
-      const Four r = (load_four<Four>(block.half_extent[k]) + slack_[k]) * size_[k];
+      const Four r = (load_four<Four>(block.half_extent[k]) + slack_) * size_[k];
       first = larger(first, m - r);
       last = lesser(last, m + r);
     }
@@ -204,22 +225,23 @@ class RayWalkBy {
     return (!less(last, first)).mask();
   }
 
-  float take(const Block& block, unsigned mask, const Four& near, float limit) {
+  /// Takes the triangles of the leaf, that of the nearest box first.
+  void take() {
+    const Block& block = task_.tree->blocks[block_number_];
     const std::uint32_t first = block.index[0];
     ++task_.blocks;
-    mask &= may_meet(four_triangles<Four>(*task_.tree, first, leaf_count(block)));
+    unsigned mask = leaf_mask_ & may_meet(four_triangles<Four>(*task_.tree, first, leaf_count(block)));
+    leaf_mask_ = 0;
     while (mask != 0) {
-      // The nearest box is taken first.
       int next = lowest_bit(mask);
       for (unsigned left = mask & (mask - 1); left != 0; left &= left - 1) {
-        if (near.v[lowest_bit(left)] < near.v[next]) next = lowest_bit(left);
+        if (leaf_near_.v[lowest_bit(left)] < leaf_near_.v[next]) next = lowest_bit(left);
       }
       mask &= ~(1u << next);
-      if (near.v[next] > limit) return limit;
-      limit = std::min(limit, task_.take(task_.context, first + static_cast<std::uint32_t>(next)));
-      if (limit < 0) return limit;
+      if (leaf_near_.v[next] > limit_) return;
+      limit_ = std::min(limit_, task_.take(task_.context, first + static_cast<std::uint32_t>(next)));
+      if (limit_ < 0) return;
     }
-    return limit;
   }
 
   unsigned may_meet(const FourCorners<Four>& t) const {
@@ -249,8 +271,12 @@ class RayWalkBy {
            d[2] * (p.x[0] * e.x[1] - p.x[1] * e.x[0]);
   }
 
-  RayTask& task_;
-  Four o_[3], inverse_[3], size_[3], slack_[3];
+  Four o_[3], inverse_[3], size_[3], slack_, leaf_near_;
+  float limit_;
+  unsigned leaf_mask_;  ///< of the triangles of the block that are to be looked at next; 0: its nodes are
+  std::uint32_t block_number_, height_;
+  RayTask task_;
+  WaitingNode stack_[kMostWaitingNodes];
 };
 
 template <typename Four>
@@ -365,7 +391,34 @@ class PointWalkBy {
 
 template <typename Four>
 void ray_walk_by(RayTask& task) {
-  RayWalkBy<Four>(task).run();
+  RayWalkBy<Four> walk;
+  walk.task() = task;
+  walk.begin();
+  while (walk.step()) {
+  }
+  task.blocks = walk.task().blocks;
+}
+
+template <typename Four>
+void ray_stream_by(const RayStream& stream) {
+  RayWalkBy<Four> walks[kRaysAtOnce];
+  std::uint32_t active[kRaysAtOnce], count = 0;
+  const auto begin = [&](std::uint32_t walk) {
+    if (!stream.next(stream.context, walk, walks[walk].task())) return false;
+    walks[walk].begin();
+    return true;
+  };
+  for (std::uint32_t walk = 0; walk < kRaysAtOnce; ++walk) {
+    if (begin(walk)) active[count++] = walk;
+  }
+  while (count > 0) {
+    for (std::uint32_t i = 0; i < count;) {
+      if (walks[active[i]].step() || begin(active[i]))
+        ++i;
+      else
+        active[i] = active[--count];
+    }
+  }
 }
 
 template <typename Four>

@@ -22,6 +22,10 @@ RayWalk ray_walk(BlockPairVariant variant) {
   return way_of(variant, RayWalk{ray_walk_by<PlainFour>}, &LaneVariant::ray_walk);
 }
 
+RayStreamWalk ray_stream_walk(BlockPairVariant variant) {
+  return way_of(variant, RayStreamWalk{ray_stream_by<PlainFour>}, &LaneVariant::ray_stream_walk);
+}
+
 PointWalk point_walk(BlockPairVariant variant) {
   return way_of(variant, PointWalk{point_walk_by<PlainFour>}, &LaneVariant::point_walk);
 }

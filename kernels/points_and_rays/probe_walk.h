@@ -8,6 +8,9 @@
 // Walks of one tree by a point or a ray in its frame. They name the triangles that float32 does not rule out.
 namespace tandem {
 
+/// Walks of rays that are made at once: while one waits for memory, others go on.
+inline constexpr std::uint32_t kRaysAtOnce = 4;
+
 /// Takes the triangles that a ray may meet, in no order. Result: the parameter, of the local ray, up to which
 /// others count; below 0: none does.
 struct RayTask {
@@ -17,6 +20,13 @@ struct RayTask {
   float (*take)(void* context, std::uint32_t triangle);
   void* context;
   std::uint64_t blocks = 0;  ///< that were looked at
+};
+
+/// Rays one after another, for kRaysAtOnce walks.
+struct RayStream {
+  /// Makes the next task of a walk, which has ended the one before. False: this walk has no more.
+  bool (*next)(void* context, std::uint32_t walk, RayTask& task);
+  void* context;
 };
 
 /// A triangle whose distance from a point is at least so much, by float32: a length in the body's frame.
@@ -38,6 +48,7 @@ struct PointTask {
 };
 
 using RayWalk = void (*)(RayTask&);
+using RayStreamWalk = void (*)(const RayStream&);
 using PointWalk = void (*)(PointTask&);
 
 // These functions are compiled once for any machine, and called by the variants.

@@ -6,6 +6,7 @@ namespace tandem {
 
 /// The named ways, or null where this machine or this build lacks them; all give the same.
 RayWalk ray_walk(BlockPairVariant variant);
+RayStreamWalk ray_stream_walk(BlockPairVariant variant);
 PointWalk point_walk(BlockPairVariant variant);
 
 }  // namespace tandem

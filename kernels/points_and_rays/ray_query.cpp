@@ -17,12 +17,17 @@ struct FoundHit {
   std::uint32_t body, triangle;
 };
 
+// Rays that a thread orders and answers at a time: few enough for the third-level cache, and enough that
+// neighbours are near each other.
+constexpr std::size_t kMostRaysInPart = 1 << 16;
+
 // The search for the hits of one ray.
 struct RaySearch {
   const SceneState* scene = nullptr;
   RayHits wanted = RayHits::first;
   WorldRay ray;
   double last;  // the greatest parameter of the world's ray that counts
+  BodyVisit visit;
   std::uint32_t body;
   const LocalRay* local;
   FoundHit best;
@@ -31,6 +36,14 @@ struct RaySearch {
   bool enough_memory = true;
 
   std::uint64_t blocks = 0, by_float64 = 0;
+
+  void begin(const RayOptions& options, std::uint32_t number, const BoxTree& tree) {
+    ray = world_ray(options.origins[number].data(), options.directions[number].data(), options.reach);
+    last = options.reach;
+    found = false;
+    all.clear();
+    visit.begin(tree);
+  }
 
   void corners_of(const FoundHit& hit, double (&out)[3][3]) const {
     const PosedTree& tree = scene->bodies[hit.body];
@@ -87,7 +100,7 @@ void walk_world_boxes(const PosedTree& tree, RaySearch& search) {
       if (block.kind[i] == NodeKind::imaginary) continue;
       const WorldBox box = node_world_box(tree.pose, block, i);
       double first = 0, last = search.last / search.ray.factor;
-      if (!meets_box(search.ray.origin, search.ray.scaled, box.lo, box.hi, first, last)) continue;
+      if (!meets_box(search.ray, box.lo, box.hi, first, last)) continue;
       if (!block.is_leaf_block())
         stack[height++] = block.index[i];
       else if (!search.take(block.index[i]))
@@ -100,66 +113,9 @@ bool is_known(RayHits hits) {
   return hits == RayHits::first || hits == RayHits::any || hits == RayHits::all;
 }
 
-}  // namespace
-
-struct RayQuery::State : Allocated {
-  struct Worker {
-    RaySearch search;
-    Buffer<RayHit> rows;  // of all hits
-    bool enough_memory = true;
-  };
-
-  RayWalk walk = best_way(tandem::ray_walk);
-  ProbedBodies bodies;
-  ProbeOrder order;
-  PerWorker<Worker> workers;
-  Buffer<std::uint32_t> begin;  // of each ray's hits, where all are asked for
-
-  void find(SceneState& scene, const RayOptions& options, std::uint32_t ray, RaySearch& search) const;
-  void walk_body(RaySearch& search) const;
-};
-
-// Whether more of the scene is to be looked at, which the walk's own limit does not tell.
-void RayQuery::State::walk_body(RaySearch& search) const {
-  const PosedTree& tree = search.scene->bodies[search.body];
-  RayTask task;
-  const RayReach reach = local_ray(bodies.frame(search.body), search.ray, search.last, task.ray);
-  if (reach == RayReach::misses) return;
-  if (reach == RayReach::out_of_range) return walk_world_boxes(tree, search);
-  task.tree = &tree.tree;
-  task.limit = task.ray.length;
-  task.take = take_triangle;
-  task.context = &search;
-  search.local = &task.ray;
-  walk(task);
-  search.blocks += task.blocks;
+RayHit no_hit(std::uint32_t ray) {
+  return {HUGE_VAL, {0, 0}, ray, kNoIndex, kNoIndex, kNoIndex};
 }
-
-void RayQuery::State::find(SceneState& scene, const RayOptions& options, std::uint32_t number,
-                           RaySearch& search) const {
-  search.scene = &scene;
-  search.wanted = options.hits;
-  search.ray = world_ray(options.origins[number].data(), options.directions[number].data(), options.reach);
-  search.last = options.reach;
-  search.found = false;
-  search.all.clear();
-  double limit = search.last / search.ray.factor;
-  const auto first_in = [&](const WorldBox& box) {
-    double first = 0, last = limit;
-    return meets_box(search.ray.origin, search.ray.scaled, box.lo, box.hi, first, last) ? first : HUGE_VAL;
-  };
-  const auto visit = [&](std::uint32_t body) {
-    if (!scene.is_body(body) || (search.wanted == RayHits::any && search.found) || !search.enough_memory)
-      return;
-    search.body = body;
-    walk_body(search);
-    // Rounded up, as a bound of a box that is just as far may be.
-    limit = search.last / search.ray.factor * (1 + 0x1p-50);
-  };
-  bodies.visit(first_in, limit, visit);
-}
-
-namespace {
 
 RayHit row_of(const SceneState& scene, std::uint32_t ray, const FoundHit& hit) {
   RayHit row;
@@ -186,7 +142,145 @@ Status check(SceneState& scene, const RayOptions& options) {
   return Status::kOk;
 }
 
+// What a thread has for the rays that it answers.
+struct RayWorker {
+  ProbeOrder order;
+  RaySearch searches[kRaysAtOnce];
+  Buffer<RayHit> rows;  // of all hits
+  bool enough_memory = true;
+
+  void begin(const SceneState& scene, RayHits wanted) {
+    rows.clear();
+    enough_memory = true;
+    for (RaySearch& search : searches) {
+      search.scene = &scene;
+      search.wanted = wanted;
+      search.enough_memory = true;
+      search.blocks = search.by_float64 = 0;
+    }
+  }
+};
+
+// A batch of rays, as threads answer it in parts.
+struct RayBatch {
+  const SceneState& scene;
+  const ProbedBodies& bodies;
+  const RayOptions& options;
+  RayStreamWalk walk;
+  std::uint32_t workers;
+  RayHit* rows;          // of each ray; null where all hits are asked for
+  std::uint32_t* count;  // of each ray's hits, where all are asked for
+
+  void answer(std::uint32_t first, std::uint32_t last, RayWorker& worker) const;
+  void take_hits(std::uint32_t ray, RaySearch& search, RayWorker& worker) const;
+  bool walks_on(RaySearch& search, RayTask& task) const;
+};
+
+// Finds the next body that a ray's tree walk is to look at. False: the search is over.
+bool RayBatch::walks_on(RaySearch& search, RayTask& task) const {
+  const auto first_in = [&](const WorldBox& box) {
+    double first = 0, last = search.last / search.ray.factor;
+    return meets_box(search.ray, box.lo, box.hi, first, last) ? first : HUGE_VAL;
+  };
+  while (!(search.wanted == RayHits::any && search.found) && search.enough_memory) {
+    // Rounded up, as a bound of a box that is just as far may be.
+    const double limit = search.last / search.ray.factor * (1 + 0x1p-50);
+    search.body = search.visit.next(bodies.tree(), first_in, limit);
+    if (search.body == kNoIndex) return false;
+    if (!scene.is_body(search.body)) continue;
+    const PosedTree& tree = scene.bodies[search.body];
+    const RayReach reach = local_ray(bodies.frame(search.body), search.ray, search.last, task.ray);
+    if (reach == RayReach::out_of_range) walk_world_boxes(tree, search);
+    if (reach != RayReach::in_frame) continue;
+    task.tree = &tree.tree;
+    task.limit = task.ray.length;
+    task.take = take_triangle;
+    task.context = &search;
+    task.blocks = 0;
+    search.local = &task.ray;
+    return true;
+  }
+  return false;
+}
+
+// Writes what was found of a ray.
+void RayBatch::take_hits(std::uint32_t ray, RaySearch& search, RayWorker& worker) const {
+  if (rows != nullptr) {
+    rows[ray] = search.found ? row_of(scene, ray, search.best) : no_hit(ray);
+    return;
+  }
+  std::sort(search.all.data(), search.all.data() + search.all.size(),
+            [&](const FoundHit& x, const FoundHit& y) { return search.comes_before(x, y); });
+  count[ray] = static_cast<std::uint32_t>(search.all.size());
+  worker.enough_memory = worker.enough_memory && search.enough_memory;
+  for (const FoundHit& hit : search.all.view())
+    worker.enough_memory = worker.enough_memory && worker.rows.push(row_of(scene, ray, hit), workers);
+}
+
+// Feeds walks with the rays of an order.
+struct RayFeed {
+  const RayBatch& batch;
+  RayWorker& worker;
+  std::size_t at = 0;
+  std::uint32_t ray[kRaysAtOnce] = {};  // of each walk; kNoIndex: none
+
+  bool next(std::uint32_t number, RayTask& task) {
+    RaySearch& search = worker.searches[number];
+    std::uint32_t& of_walk = ray[number];
+    if (of_walk != kNoIndex) search.blocks += task.blocks;
+    while (of_walk == kNoIndex || !batch.walks_on(search, task)) {
+      if (of_walk != kNoIndex) batch.take_hits(of_walk, search, worker);
+      if (at == worker.order.size() || !worker.enough_memory) return false;
+      fetch(worker.order.ahead(at));
+      of_walk = worker.order[at++];
+      search.begin(batch.options, of_walk, batch.bodies.tree());
+    }
+    return true;
+  }
+
+  void fetch(std::uint32_t soon) const {
+    fetch_ahead(batch.options.origins[soon].data());
+    fetch_ahead(batch.options.directions[soon].data());
+    if (batch.rows != nullptr) fetch_ahead(batch.rows + soon);
+  }
+};
+
+// Rays that enter the scene near each other follow each other; those that miss it are answered at once.
+void RayBatch::answer(std::uint32_t first, std::uint32_t last, RayWorker& worker) const {
+  const WorldBox bounds = bodies.bounds();
+  const auto place = [&](std::uint32_t i, double* out) {
+    const WorldRay ray = world_ray(options.origins[i].data(), options.directions[i].data(), options.reach);
+    double begin = 0, end = HUGE_VAL;
+    if (!meets_box(ray, bounds.lo, bounds.hi, begin, end)) {
+      if (rows != nullptr)
+        rows[i] = no_hit(i);
+      else
+        count[i] = 0;
+      return false;
+    }
+    for (int k = 0; k < 3; ++k) out[k] = ray.origin[k] + begin * ray.scaled[k];
+    return true;
+  };
+  if (!worker.order.make(first, last, place)) {
+    worker.enough_memory = false;
+    return;
+  }
+  RayFeed feed = {*this, worker};
+  std::fill_n(feed.ray, kRaysAtOnce, kNoIndex);
+  const auto next = [](void* context, std::uint32_t number, RayTask& task) {
+    return static_cast<RayFeed*>(context)->next(number, task);
+  };
+  walk({next, &feed});
+}
+
 }  // namespace
+
+struct RayQuery::State : Allocated {
+  RayStreamWalk walk = best_way(ray_stream_walk);
+  ProbedBodies bodies;
+  PerWorker<RayWorker> workers;
+  Buffer<std::uint32_t> begin;  // of each ray's hits, where all are asked for
+};
 
 Status RayQuery::answer(SceneState& scene, const RayOptions& options) {
   const std::size_t count = options.origins.size();
@@ -197,53 +291,33 @@ Status RayQuery::answer(SceneState& scene, const RayOptions& options) {
   if (const Status status = state.bodies.make(scene); status != Status::kOk) return status;
   const std::uint32_t workers = scene.workers_for(count, kProbesAtOnce);
   if (!scene.threads.provide(workers)) return scene.fail(Status::kCannotStartThread, 0);
-  // Rays that enter the scene near each other follow each other; those that miss it come first.
-  const WorldBox bounds = state.bodies.bounds();
-  const auto place = [&](std::size_t i, double* out) {
-    const WorldRay ray = world_ray(options.origins[i].data(), options.directions[i].data(), HUGE_VAL);
-    double first = 0, last = HUGE_VAL;
-    if (!meets_box(ray.origin, ray.scaled, bounds.lo, bounds.hi, first, last)) first = 0;
-    for (int k = 0; k < 3; ++k) out[k] = ray.origin[k] + first * ray.scaled[k];
-  };
-  if (!state.workers.provide(workers) || !state.order.make<3>(count, place) ||
-      !rows_.resize(all ? 0 : count) || !state.begin.resize(all ? count + 1 : 0))
+  if (!state.workers.provide(workers) || !rows_.resize(all ? 0 : count) ||
+      !state.begin.resize(all ? count + 1 : 0))
     return scene.fail(Status::kOutOfMemory, 0);
-  for (std::uint32_t i = 0; i < workers; ++i) {
-    State::Worker& worker = state.workers[i];
-    worker.rows.clear();
-    worker.enough_memory = worker.search.enough_memory = true;
-    worker.search.blocks = worker.search.by_float64 = 0;
-  }
-  const auto find = [&](std::size_t i, std::size_t end, std::uint32_t number) {
-    State::Worker& worker = state.workers[number];
-    RaySearch& search = worker.search;
-    for (; i < end && worker.enough_memory; ++i) {
-      const std::uint32_t ray = state.order[i], soon = state.order.ahead(i);
-      fetch_ahead(options.origins[soon].data());
-      fetch_ahead(options.directions[soon].data());
-      if (!all) fetch_ahead(&rows_[soon]);
-      state.find(scene, options, ray, search);
-      if (!all) {
-        rows_[ray] = search.found ? row_of(scene, ray, search.best)
-                                  : RayHit{HUGE_VAL, {0, 0}, ray, kNoIndex, kNoIndex, kNoIndex};
-        continue;
-      }
-      std::sort(search.all.data(), search.all.data() + search.all.size(),
-                [&](const FoundHit& x, const FoundHit& y) { return search.comes_before(x, y); });
-      state.begin[ray + 1] = static_cast<std::uint32_t>(search.all.size());
-      for (const FoundHit& hit : search.all.view())
-        worker.enough_memory = worker.enough_memory && worker.rows.push(row_of(scene, ray, hit), workers);
-      worker.enough_memory = worker.enough_memory && search.enough_memory;
+  for (std::uint32_t i = 0; i < workers; ++i) state.workers[i].begin(scene, options.hits);
+  const RayBatch batch = {scene,
+                          state.bodies,
+                          options,
+                          state.walk,
+                          workers,
+                          all ? nullptr : rows_.data(),
+                          all ? state.begin.data() + 1 : nullptr};
+  const std::size_t part = std::clamp(count / (4 * workers), kProbesAtOnce, kMostRaysInPart);
+  scene.threads.for_parts(workers, count, part, [&](std::size_t i, std::size_t end, std::uint32_t worker) {
+    for (; i < end && state.workers[worker].enough_memory; i += part) {
+      batch.answer(static_cast<std::uint32_t>(i), static_cast<std::uint32_t>(std::min(i + part, end)),
+                   state.workers[worker]);
     }
-  };
-  scene.threads.for_parts(workers, count, kProbesAtOnce, find);
+  });
   counters_ = {count, 0, 0, 0};
   std::size_t hits = 0;
   for (std::uint32_t i = 0; i < workers; ++i) {
-    State::Worker& worker = state.workers[i];
+    const RayWorker& worker = state.workers[i];
     if (!worker.enough_memory) return scene.fail(Status::kOutOfMemory, 0);
-    counters_.blocks += worker.search.blocks;
-    counters_.by_float64 += worker.search.by_float64;
+    for (const RaySearch& search : worker.searches) {
+      counters_.blocks += search.blocks;
+      counters_.by_float64 += search.by_float64;
+    }
     hits += worker.rows.size();
   }
   if (!all) {
@@ -262,12 +336,10 @@ Status RayQuery::answer(SceneState& scene, const RayOptions& options) {
 }
 
 Status RayQuery::find(Scene& in, const RayOptions& options) {
-  static_cast<void>(forget(Status::kOk));
-  SceneState* const scene = in.state();
-  if (scene == nullptr) return Status::kOutOfMemory;
-  Status status = check(*scene, options);
-  if (status == Status::kOk) status = answer(*scene, options);
-  return status == Status::kOk ? status : forget(status);
+  return ask_scene(in, [&](SceneState& scene) {
+    const Status status = check(scene, options);
+    return status == Status::kOk ? answer(scene, options) : status;
+  });
 }
 
 }  // namespace tandem

@@ -7,6 +7,7 @@
 
 #include "kernels/common/block_pair.h"
 #include "kernels/geometry/local_frame.h"
+#include "kernels/scene/body_visit.h"
 #include "kernels/scene/scene_state.h"
 
 // What questions about points and rays share: the bodies in their frames, a tree of their world boxes, and an
@@ -34,12 +35,12 @@ class ProbedBodies {
   /// The box of all bodies; empty where there are none.
   const WorldBox& bounds() const { return bounds_; }
 
-  /// Visits bodies in about the order of a bound: bound(world box) -> double is not above what it is for
-  /// anything in the box, and infinity where nothing there counts. Those with a bound of more than `limit`
-  /// are passed over; visit(body) may make that less.
+  const BoxTree& tree() const { return boxes_; }
+
+  /// Visits bodies as BodyVisit has it; visit(body) may make the limit less.
   template <typename Bound, typename Visit>
   void visit(const Bound& bound, const double& limit, const Visit& visit) const {
-    boxes_.visit_nearest(bound, limit, [&](std::size_t place) { visit(boxes_.items[place].box); });
+    visit_nearest(boxes_, bound, limit, visit);
   }
 
  private:
@@ -56,13 +57,16 @@ inline void fetch_ahead([[maybe_unused]] const void* data) {
 #endif
 }
 
-/// Says where things lie that are to be ordered: numbers in the same units in a box.
+/// An order in which things follow each other that lie near each other.
 class ProbeOrder {
  public:
-  /// Orders the things 0 to count - 1 so that those follow each other whose places are near each other, by
-  /// Morton's order. place(i, out) writes kNumbers numbers of thing i. False: out of memory.
-  template <int kNumbers, typename Place>
-  [[nodiscard]] bool make(std::size_t count, const Place& place);
+  /// Orders the things first to last - 1 by Morton's order of their places. place(i, out) writes three
+  /// numbers of thing i; false: the thing is left out. False: out of memory.
+  template <typename Place>
+  [[nodiscard]] bool make(std::uint32_t first, std::uint32_t last, const Place& place);
+
+  /// The number of things that were not left out.
+  std::size_t size() const { return keys_.size(); }
 
   std::uint32_t operator[](std::size_t i) const { return static_cast<std::uint32_t>(keys_[i]); }
 
@@ -70,44 +74,32 @@ class ProbeOrder {
   std::uint32_t ahead(std::size_t i) const { return (*this)[i + kAhead < keys_.size() ? i + kAhead : i]; }
 
  private:
+  using Place = std::array<float, 3>;
+  struct Numbered {
+    Place place;
+    std::uint32_t number;
+  };
+
   bool sort();
 
+  Buffer<Numbered> places_;
   Buffer<std::uint64_t> keys_, other_;  // a key of kKeyBits in the upper half, a number in the lower
   static constexpr int kKeyBits = 30;
   static constexpr std::size_t kAhead = 8;
 };
 
-template <int kNumbers, typename Place>
-bool ProbeOrder::make(std::size_t count, const Place& place) {
-  constexpr int kBits = kKeyBits / kNumbers;
-  constexpr double kSteps = std::uint64_t{1} << kBits;
-  if (!keys_.resize(count) || !other_.resize(count)) return false;
-  double lo[kNumbers], hi[kNumbers], at[kNumbers];
-  std::fill_n(lo, kNumbers, HUGE_VAL);
-  std::fill_n(hi, kNumbers, -HUGE_VAL);
-  for (std::size_t i = 0; i < count; ++i) {
-    place(i, at);
-    for (int k = 0; k < kNumbers; ++k) {
-      lo[k] = at[k] < lo[k] ? at[k] : lo[k];
-      hi[k] = at[k] > hi[k] ? at[k] : hi[k];
-    }
+template <typename PlaceOf>
+bool ProbeOrder::make(std::uint32_t first, std::uint32_t last, const PlaceOf& place) {
+  if (!places_.resize(last - first)) return false;
+  std::size_t count = 0;
+  for (std::uint32_t i = first; i < last; ++i) {
+    double at[3];
+    if (!place(i, at)) continue;
+    Numbered& next = places_[count++];
+    for (int k = 0; k < 3; ++k) next.place[k] = static_cast<float>(at[k]);
+    next.number = i;
   }
-  double scale[kNumbers];
-  for (int k = 0; k < kNumbers; ++k) scale[k] = hi[k] > lo[k] ? 0.999 * kSteps / (hi[k] - lo[k]) : 0;
-  for (std::size_t i = 0; i < count; ++i) {
-    place(i, at);
-    std::uint64_t key = 0;
-    std::uint32_t step[kNumbers];
-    for (int k = 0; k < kNumbers; ++k) {
-      const double x = (at[k] - lo[k]) * scale[k];
-      step[k] = x >= 0 && x < kSteps ? static_cast<std::uint32_t>(x) : 0;
-    }
-    for (int bit = kBits - 1; bit >= 0; --bit) {
-      for (int k = 0; k < kNumbers; ++k) key = key << 1 | (step[k] >> bit & 1);
-    }
-    keys_[i] = key << 32 | i;
-  }
-  return sort();
+  return places_.resize(count) && sort();
 }
 
 }  // namespace tandem

@@ -29,7 +29,7 @@ class DynamicBoxTree {
   template <typename Visit>
   void visit(std::uint32_t number, const WorldBox& box, const PairFilter& filter, const Visit& visit) const {
     const BoxTree::Kind kind = BoxTree::Kind::of(filter, number);
-    tree_.visit(box, &kind, [&](std::size_t place) { visit(tree_.items[place].box); });
+    tree_.visit(box, &kind, visit);
     for (std::size_t other = place_of_.size(); other < count_; ++other)
       visit(static_cast<std::uint32_t>(other));
   }

@@ -40,6 +40,7 @@ constexpr LaneVariant kLaneVariantOf = {block_pair_mask_of_lanes<kCount>,
                                         &kManifoldLanes,
                                         refit_of_lanes<kCount>,
                                         ray_walk_by<Lanes4>,
+                                        ray_stream_by<Lanes4>,
                                         point_walk_by<Lanes4>};
 
 }  // namespace

@@ -52,6 +52,15 @@ class Answer {
     return status;
   }
 
+  /// Has find(state of the scene) make a new answer. Result: what it returns; nothing is left after an error.
+  template <typename Find>
+  Status ask_scene(Scene& scene, const Find& find) {
+    SceneState* const state = scene.state();
+    if (state == nullptr) return forget(Status::kOutOfMemory);
+    const Status status = find(*state);
+    return status == Status::kOk ? status : forget(status);
+  }
+
   DeviceAnswer<Row, Counters> found() { return {pairs_, rows_, counters_, memory_on_device_}; }
 
   Buffer<ObjectPair> pairs_;
@@ -111,10 +120,10 @@ class PairQuestion : public Answer<Row, Counters> {
 
  private:
   Status ask(Scene& scene, const std::span<const ObjectPair>* given, const Options& options) {
-    SceneState* const state = scene.state();
-    if (state == nullptr) return this->forget(Status::kOutOfMemory);
-    const Status status = static_cast<Of*>(this)->answer(*state, given, options);
-    return status == Status::kOk ? status : this->forget(status);
+    const auto find = [&](SceneState& state) {
+      return static_cast<Of*>(this)->answer(state, given, options);
+    };
+    return this->ask_scene(scene, find);
   }
 };
 

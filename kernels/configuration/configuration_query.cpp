@@ -4,6 +4,7 @@
 #include <atomic>
 
 #include "kernels/common/check_options.h"
+#include "kernels/configuration/configuration_worlds.h"
 #include "kernels/contact/first_contact.h"
 #include "kernels/distance/pair_distance.h"
 #include "kernels/scene/body_visit.h"
@@ -43,13 +44,17 @@ double gap_of(const WorldBox& a, const WorldBox& b) {
 
 Candidate candidate_of(const PosedTree& a, const PosedTree& b, const ObjectPair& bodies, double gap) {
   const bool in_order = bodies.a < bodies.b;
-  return {in_order ? &a : &b, in_order ? &b : &a,
-          {std::min(bodies.a, bodies.b), std::max(bodies.a, bodies.b)}, gap};
+  return {in_order ? &a : &b,
+          in_order ? &b : &a,
+          {std::min(bodies.a, bodies.b), std::max(bodies.a, bodies.b)},
+          gap};
 }
 
 void sort_by_gap(Buffer<Candidate>& candidates) {
   std::sort(candidates.data(), candidates.data() + candidates.size(),
-            [](const Candidate& x, const Candidate& y) { return x.gap != y.gap ? x.gap < y.gap : x.bodies < y.bodies; });
+            [](const Candidate& x, const Candidate& y) {
+              return x.gap != y.gap ? x.gap < y.gap : x.bodies < y.bodies;
+            });
 }
 
 }  // namespace
@@ -61,8 +66,8 @@ struct ConfigurationQuery::State : Allocated {
     Buffer<Candidate> candidates;
     FirstContact first_contact;
     DistanceSearch search;
-    ConfigurationPair nearest;  // of the last configuration
-    NearestTriangles triangles;     // of `nearest`
+    ConfigurationPair nearest;   // of the last configuration
+    NearestTriangles triangles;  // of `nearest`
     Buffer<ConfigurationPair> found;
     ConfigurationCounters counters;
     bool enough_memory = true;
@@ -91,6 +96,7 @@ struct ConfigurationQuery::State : Allocated {
   Buffer<std::uint32_t> moved_before;  // the bodies that did not stand then
   Buffer<Motion> motion;
   PerWorker<Worker> workers;
+  ConfigurationWorlds worlds;
   std::atomic<std::size_t> first_refused;
 };
 
@@ -163,17 +169,17 @@ bool ConfigurationQuery::State::meet(const SceneState& scene, const Configuratio
   for (const MovingPair& pair : moving_pairs.view()) {
     const WorldBox &a = worker.boxes[pair.a], &b = worker.boxes[pair.b];
     if (!overlap(a, b)) continue;
-    enough_memory = enough_memory &&
-                    worker.candidates.push(candidate_of(worker.trees[pair.a], worker.trees[pair.b],
-                                                        {bodies[pair.a], bodies[pair.b]}, gap_of(a, b)));
+    enough_memory =
+        enough_memory && worker.candidates.push(candidate_of(worker.trees[pair.a], worker.trees[pair.b],
+                                                             {bodies[pair.a], bodies[pair.b]}, gap_of(a, b)));
   }
   for (std::uint32_t i = 0; i < bodies.size() && standing.kept_of() != 0; ++i) {
     const WorldBox& box = worker.boxes[i];
     standing.kept().visit(box, [&](std::uint32_t other) {
       if (!filter.looks_at(bodies[i], other)) return;
-      enough_memory = enough_memory &&
-                      worker.candidates.push(candidate_of(worker.trees[i], scene.bodies[other],
-                                                          {bodies[i], other}, gap_of(box, scene.boxes[other])));
+      enough_memory = enough_memory && worker.candidates.push(
+                                           candidate_of(worker.trees[i], scene.bodies[other],
+                                                        {bodies[i], other}, gap_of(box, scene.boxes[other])));
     });
   }
   sort_by_gap(worker.candidates);
@@ -215,9 +221,9 @@ void ConfigurationQuery::State::bound(const ConfigurationOptions& options, const
   worker.triangles = {distance.triangle_a, distance.triangle_b};
 }
 
-// Looks at the nearest boxes first, of pairs of moving bodies and then of those with one that stands. What was
-// nearest in the configuration before comes first of all, as this is mostly like it; but not from one part of
-// the configurations to the next, so that no result depends on the number of threads.
+// Looks at the nearest boxes first, of pairs of moving bodies and then of those with one that stands. What
+// was nearest in the configuration before comes first of all, as this is mostly like it; but not from one
+// part of the configurations to the next, so that no result depends on the number of threads.
 void ConfigurationQuery::State::find_nearest(const SceneState& scene, const ConfigurationOptions& options,
                                              std::size_t configuration, Worker& worker) const {
   const std::span<const std::uint32_t> bodies = options.bodies;
@@ -239,13 +245,15 @@ void ConfigurationQuery::State::find_nearest(const SceneState& scene, const Conf
   worker.candidates.clear();
   for (const MovingPair& pair : moving_pairs.view()) {
     const double gap = distance_between(worker.boxes[pair.a], worker.boxes[pair.b]);
-    Candidate candidate = candidate_of(worker.trees[pair.a], worker.trees[pair.b],
-                                       {bodies[pair.a], bodies[pair.b]}, gap);
+    Candidate candidate =
+        candidate_of(worker.trees[pair.a], worker.trees[pair.b], {bodies[pair.a], bodies[pair.b]}, gap);
     if (candidate.bodies == former) candidate.gap = -1;
     worker.enough_memory = worker.enough_memory && worker.candidates.push(candidate);
   }
   for (std::uint32_t i = 0; i < bodies.size(); ++i) {
-    const std::uint32_t other = former.a == bodies[i] ? former.b : former.b == bodies[i] ? former.a : kNoIndex;
+    const std::uint32_t other = former.a == bodies[i]   ? former.b
+                                : former.b == bodies[i] ? former.a
+                                                        : kNoIndex;
     if (other != kNoIndex && moves[other] == 0) look_at(standing_one(i, other));
   }
   sort_by_gap(worker.candidates);
@@ -263,11 +271,10 @@ void ConfigurationQuery::State::find_nearest(const SceneState& scene, const Conf
   worker.enough_memory = worker.enough_memory && worker.found.push(nearest);
 }
 
+// Condition: the bodies are posed.
 void ConfigurationQuery::State::work(const SceneState& scene, const ConfigurationOptions& options,
                                      std::size_t configuration, Worker& worker) {
-  if (!pose(scene, options, configuration, worker)) return;
-  if (options.find == ConfigurationPairs::nearest)
-    return find_nearest(scene, options, configuration, worker);
+  if (options.find == ConfigurationPairs::nearest) return find_nearest(scene, options, configuration, worker);
   worker.enough_memory = meet(scene, options, worker);
   decide(options, configuration, worker);
 }
@@ -276,7 +283,6 @@ Status ConfigurationQuery::answer(SceneState& scene, const ConfigurationOptions&
   const std::size_t moving = options.bodies.size();
   State* const state = state_.provide();
   if (state == nullptr) return scene.fail(Status::kOutOfMemory, 0);
-  if (scene.device != nullptr) return scene.fail(Status::kBadOption, 0);
   const Status sound = options.find == ConfigurationPairs::nearest
                            ? check_distance_options(options.tolerance, options.within)
                            : check_within(options.within);
@@ -285,8 +291,9 @@ Status ConfigurationQuery::answer(SceneState& scene, const ConfigurationOptions&
   if (moving == 0 ? !options.poses.empty() : options.poses.size() % moving != 0)
     return scene.fail(Status::kMotionMismatch, options.poses.size());
   const std::size_t count = moving == 0 ? 0 : options.poses.size() / moving;
-  if (const Status status = state->prepare(scene, options); status != Status::kOk)
-    return scene.fail(status, 0);
+  const bool by_device = scene.device != nullptr;
+  const Status prepared = by_device ? Status::kOk : state->prepare(scene, options);
+  if (prepared != Status::kOk) return scene.fail(prepared, 0);
 
   const std::uint32_t workers = scene.workers_for(count, kConfigurationsAtOnce);
   if (!scene.threads.provide(workers)) return scene.fail(Status::kCannotStartThread, 0);
@@ -302,8 +309,11 @@ Status ConfigurationQuery::answer(SceneState& scene, const ConfigurationOptions&
   state->first_refused = options.poses.size();
   scene.threads.for_parts(workers, count, kConfigurationsAtOnce,
                           [&](std::size_t i, std::size_t end, std::uint32_t worker) {
-                            for (; i < end && state->workers[worker].enough_memory; ++i)
-                              state->work(scene, options, i, state->workers[worker]);
+                            for (; i < end && state->workers[worker].enough_memory; ++i) {
+                              const bool in_range = state->pose(scene, options, i, state->workers[worker]);
+                              if (in_range && !by_device)
+                                state->work(scene, options, i, state->workers[worker]);
+                            }
                           });
   if (const std::size_t refused = state->first_refused; refused != options.poses.size()) {
     PosedTree tree;
@@ -313,12 +323,14 @@ Status ConfigurationQuery::answer(SceneState& scene, const ConfigurationOptions&
   }
   rows_.clear();
   counters_ = {count, 0, 0, 0};
+  if (by_device) return state->worlds.find(scene, options, state->moves.view(), rows_, counters_);
   for (std::uint32_t i = 0; i < workers; ++i) {
     State::Worker& worker = state->workers[i];
     bool enough_memory = worker.enough_memory;
     for (const ConfigurationPair& row : worker.found.view()) enough_memory = enough_memory && rows_.push(row);
     if (!enough_memory) return scene.fail(Status::kOutOfMemory, 0);
-    worker.counters.block_pairs = worker.first_contact.block_pairs() + worker.search.found.counters.block_pairs;
+    worker.counters.block_pairs =
+        worker.first_contact.block_pairs() + worker.search.found.counters.block_pairs;
     add_to(counters_, worker.counters,
            {&ConfigurationCounters::touching, &ConfigurationCounters::object_pairs,
             &ConfigurationCounters::block_pairs});

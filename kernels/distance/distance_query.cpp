@@ -83,8 +83,7 @@ void DistanceQuery::State::find_one(std::size_t pair, DistanceSearch& search) {
 
 // Walks of which none knows what the others find, whoever takes them; what they found and left, in their
 // order.
-bool DistanceQuery::State::walk_round(const NearestTask& task, std::size_t first,
-                                      DistanceSearch& whole) {
+bool DistanceQuery::State::walk_round(const NearestTask& task, std::size_t first, DistanceSearch& whole) {
   NearestSoFar& state = whole.found;
   const std::size_t count = std::min(whole.walks.size() - first, kWalksInRound);
   const auto walk = [&](std::size_t i, std::size_t end, std::uint32_t) {

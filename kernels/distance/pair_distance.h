@@ -37,7 +37,8 @@ struct DistanceSearch {
 
   /// Finds the distance, by the named way where the task is in_frame. Whether there was enough memory is told
   /// by `found`.
-  ObjectDistance find(const NearestTask& task, double reach, const NearestTriangles& former, NearestPhase way);
+  ObjectDistance find(const NearestTask& task, double reach, const NearestTriangles& former,
+                      NearestPhase way);
 };
 
 inline NearestPhase phase_of(const NearestTask& task, NearestPhase way) {

@@ -264,7 +264,8 @@ class Gpu final : public SceneDevice {
     if (status == Status::kOk) status = upload(scene.columns.motion, motion_on_gpu_, filter_.motion);
     if (status == Status::kOk)
       status = upload(any_removed ? group_ : scene.columns.group, group_on_gpu_, filter_.group);
-    if (status == Status::kOk) status = upload(any_removed ? mask_ : scene.columns.mask, mask_on_gpu_, filter_.mask);
+    if (status == Status::kOk)
+      status = upload(any_removed ? mask_ : scene.columns.mask, mask_on_gpu_, filter_.mask);
     if (status == Status::kOk) status = upload(scene.columns.world, world_on_gpu_, filter_.world);
     if (status == Status::kOk) status = wait();
     if (status == Status::kOk) version_ = scene.version;
@@ -336,8 +337,8 @@ class Gpu final : public SceneDevice {
 
   Status keep_fixed(SceneState& scene, bool& fixed_kept) {
     const Motion* const begin = scene.columns.motion.data();
-    const bool any_fixed =
-        std::find(begin, begin + scene.columns.motion.size(), Motion::fixed) != begin + scene.columns.motion.size();
+    const bool any_fixed = std::find(begin, begin + scene.columns.motion.size(), Motion::fixed) !=
+                           begin + scene.columns.motion.size();
     if (any_fixed ? fixed_kept : !keeps_fixed_) return Status::kOk;
     Buffer<Motion> all_moving;
     if (!any_fixed && !all_moving.resize(instances_.count)) return Status::kOutOfMemory;

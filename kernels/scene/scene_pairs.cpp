@@ -245,9 +245,8 @@ Status SceneState::search_changed() {
   bool enough_memory = fresh_.resize(found_.size());
   if (!enough_memory) return Status::kOutOfMemory;
   ObjectPair* const unchanged_end =
-      std::copy_if(found_.data(), found_.data() + found_.size(), fresh_.data(), [&](const ObjectPair& pair) {
-        return (changed_[pair.a] | changed_[pair.b]) == 0;
-      });
+      std::copy_if(found_.data(), found_.data() + found_.size(), fresh_.data(),
+                   [&](const ObjectPair& pair) { return (changed_[pair.a] | changed_[pair.b]) == 0; });
   const auto kept = static_cast<std::size_t>(unchanged_end - fresh_.data());
   enough_memory = fresh_.resize(kept);
   each_changed([&](std::uint32_t i) {

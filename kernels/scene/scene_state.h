@@ -122,6 +122,9 @@ struct SceneState : Allocated {
   /// Result: kOk, or kNoTopology where an asset has none.
   Status require_topology();
 
+  /// Has the device take the fixed bodies anew, since it was asked about others meanwhile.
+  void forget_fixed_on_device() { fixed_kept_ = false; }
+
   /// Result: kOk; or kDeformed where an asset is, or kNotFloat32 where the corners of one are no float32
   /// numbers.
   Status require_undeformed();
@@ -195,7 +198,7 @@ struct SceneState : Allocated {
   FoundPairs found_of_;
   Buffer<std::uint8_t> changed_;  // of each body: since pairs were found
   std::size_t changed_count_ = 0;
-  DynamicBoxTree tree_;  // of asked_boxes(), where few change again and again
+  DynamicBoxTree tree_;             // of asked_boxes(), where few change again and again
   std::size_t searched_alone_ = 0;  // bodies that were tested against all since there was a tree
   bool any_fixed_ = false;
   bool fixed_kept_ = false;  // the broad phase has a tree of the fixed bodies as they stand

@@ -413,19 +413,23 @@ public unsafe struct tandem_body_at {
 [StructLayout(LayoutKind.Sequential)]
 public unsafe struct tandem_configuration_options {
   public uint struct_size;
-  public uint all_pairs;
+  public uint find;
   public uint* bodies;
   public UIntPtr body_count;
   public tandem_pose* poses;
   public UIntPtr pose_count;
   public double within;
+  public double absolute_tolerance;
+  public double relative_tolerance;
 }
 
 [StructLayout(LayoutKind.Sequential)]
 public unsafe struct tandem_configuration_pair {
-  public uint configuration;
+  public ulong configuration;
   public uint a;
   public uint b;
+  public double lower;
+  public double upper;
 }
 
 [StructLayout(LayoutKind.Sequential)]

@@ -630,20 +630,24 @@ pub struct tandem_body_at {
 #[derive(Clone, Copy)]
 pub struct tandem_configuration_options {
     pub struct_size: u32,
-    pub all_pairs: u32,
+    pub find: u32,
     pub bodies: *const u32,
     pub body_count: usize,
     pub poses: *const tandem_pose,
     pub pose_count: usize,
     pub within: f64,
+    pub absolute_tolerance: f64,
+    pub relative_tolerance: f64,
 }
 
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct tandem_configuration_pair {
-    pub configuration: u32,
+    pub configuration: u64,
     pub a: u32,
     pub b: u32,
+    pub lower: f64,
+    pub upper: f64,
 }
 
 #[repr(C)]

@@ -792,8 +792,8 @@ typedef struct tandem_configuration_options {
   size_t body_count;
   const tandem_pose* poses;
   size_t pose_count;
-  double within;                ///< bodies touch where their distance is at most this; or how far is looked
-  double absolute_tolerance;    ///< of TANDEM_CONFIGURATION_NEAREST, as of tandem_distance_options
+  double within;              ///< bodies touch where their distance is at most this; or how far is looked
+  double absolute_tolerance;  ///< of TANDEM_CONFIGURATION_NEAREST, as of tandem_distance_options
   double relative_tolerance;
 } tandem_configuration_options;
 
@@ -805,7 +805,7 @@ typedef enum tandem_configuration_pairs {
                                     ///< may be infinite; bounds are of the least distance of all pairs
 } tandem_configuration_pairs;
 
-/// Two bodies of a configuration; a < b.
+/// Two bodies of a configuration, a < b, and bounds of their distance.
 typedef struct tandem_configuration_pair {
   uint64_t configuration;
   uint32_t a, b;
@@ -820,8 +820,8 @@ typedef struct tandem_configuration_counters {
 /// prepared once, and the scene stays as it is. Pairs of two bodies that stand are not looked at. Rows ascend
 /// by configuration. Result: TANDEM_UNKNOWN_INSTANCE, where `where` is the place in `bodies` of one that does
 /// not exist or stands there twice; TANDEM_MOTION_MISMATCH; TANDEM_BAD_REACH; TANDEM_BAD_TOLERANCE;
-/// TANDEM_POSE_NOT_RIGID or TANDEM_OUT_OF_RANGE, where `where` is the first such pose; TANDEM_BAD_OPTION where
-/// a device answers.
+/// TANDEM_POSE_NOT_RIGID or TANDEM_OUT_OF_RANGE, where `where` is the first such pose; or as of contacts and
+/// distances.
 TANDEM_API tandem_status tandem_scene_find_configurations(tandem_scene* scene,
                                                           const tandem_configuration_options* options);
 TANDEM_API const tandem_configuration_pair* tandem_scene_configurations(const tandem_scene* scene,

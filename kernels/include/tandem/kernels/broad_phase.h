@@ -121,7 +121,7 @@ class BroadPhase {
   static std::uint32_t meeting(const TreePair& trees, const GroupPair& pair);
   static std::uint32_t may_look(const TreePair& trees, const GroupPair& pair);
   static bool take(std::span<const WorldBox> boxes, const std::uint32_t* world, const std::uint32_t* numbers,
-            Tree& tree, Team team);
+                   Tree& tree, Team team);
   static bool halve(Item* all, const PairFilter& filter, Range& range, Range& right);
   static void split(Item* all, const PairFilter& filter, Range range);
   static void split(Item* all, const PairFilter& filter, Range range, Team team);

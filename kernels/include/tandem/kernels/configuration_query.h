@@ -41,16 +41,17 @@ struct ConfigurationCounters {
   std::uint64_t configurations = 0;
   std::uint64_t touching = 0;      ///< of these; for `nearest`, those with a pair that meets
   std::uint64_t object_pairs = 0;  ///< that were decided
-  std::uint64_t block_pairs = 0;   ///< 16 box tests each
+  std::uint64_t block_pairs = 0;   ///< 16 box tests each; 0 where a device answered
 
   friend bool operator==(const ConfigurationCounters&, const ConfigurationCounters&) = default;
 };
 
 /// Asks the same of many configurations of a scene: whether anything touches, or how near it comes. The
-/// bodies that move get other poses in each; what stands is prepared once, and the scene stays as it is. Pairs
-/// that the scene's filter looks at count, but for pairs of bodies that both stand. Decides as ContactQuery in
-/// mode exact does, and bounds distances as DistanceQuery, in every configuration alike. All threads of the
-/// scene take part.
+/// bodies that move get other poses in each; what stands is prepared once, and the scene stays as it is.
+/// Pairs that the scene's filter looks at count, but for pairs of bodies that both stand. Decides as
+/// ContactQuery in mode exact does, and bounds distances as DistanceQuery, in every configuration alike. All
+/// threads of the scene take part. A device answers many configurations at a time, each as a world of its
+/// own.
 class ConfigurationQuery : public Answer<ConfigurationPair, ConfigurationCounters> {
  public:
   using Options = ConfigurationOptions;
@@ -60,8 +61,8 @@ class ConfigurationQuery : public Answer<ConfigurationPair, ConfigurationCounter
   /// the scene is the place in `bodies` of one that does not exist or that stands there twice;
   /// kMotionMismatch where `poses` are not so many for each configuration; kBadReach (see
   /// ContactOptions::within; for `nearest` as DistanceOptions::reach); kBadTolerance; kPoseNotRigid or
-  /// kOutOfRange, where where() is the first such pose; kBadOption, where the scene is answered by a device;
-  /// kCannotStartThread; or kOutOfMemory.
+  /// kOutOfRange, where where() is the first such pose; kCannotStartThread; kOutOfMemory; or as of
+  /// ContactQuery and DistanceQuery.
   Status find(Scene& scene, const ConfigurationOptions& options);
 
  private:

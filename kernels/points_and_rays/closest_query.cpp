@@ -158,9 +158,18 @@ struct ClosestQuery::State : Allocated {
 
   Status label(SceneState& scene);
   void walk_body(ClosestSearch& search) const;
-  void find(const ClosestOptions& options, ClosestSearch& search, ClosestPoint& row) const;
-  void find_sides(ClosestSearch& search, ClosestPoint& row) const;
+  void find(const ClosestOptions& options, std::uint32_t of, ClosestSearch& search, ClosestPoint& row) const;
+  void find_part(const ClosestOptions& options, std::uint32_t of, std::size_t first, std::size_t last,
+                 ClosestSearch& search, ClosestPoint* rows, std::size_t stride) const;
+  void add_side(std::uint32_t body, ClosestSearch& search, ClosestPoint& row) const;
   void count_crossings(std::uint32_t body, ClosestSearch& search, CrossingCount& count) const;
+
+  // Visits one body, or all: see ProbedBodies.
+  template <typename Bound, typename Visit>
+  void visit(std::uint32_t of, const Bound& bound, const double& limit, const Visit& at) const {
+    if (of == kNoIndex) return bodies.visit(bound, limit, at);
+    at(of);
+  }
 };
 
 Status ClosestQuery::State::label(SceneState& scene) {
@@ -209,10 +218,11 @@ void ClosestQuery::State::walk_body(ClosestSearch& search) const {
   search.blocks += task.blocks;
 }
 
-void ClosestQuery::State::find(const ClosestOptions& options, ClosestSearch& search,
+// of: the body that is looked at; kNoIndex: all are.
+void ClosestQuery::State::find(const ClosestOptions& options, std::uint32_t of, ClosestSearch& search,
                                ClosestPoint& row) const {
   const auto bound = [&](const WorldBox& box) { return distance_to(box, search.point); };
-  bodies.visit(bound, search.upper, [&](std::uint32_t body) {
+  visit(of, bound, search.upper, [&](std::uint32_t body) {
     if (!search.scene->is_body(body)) return;
     search.body = body;
     walk_body(search);
@@ -233,7 +243,26 @@ void ClosestQuery::State::find(const ClosestOptions& options, ClosestSearch& sea
     row.triangle = search.best_triangle;
     row.face = search.scene->bodies[row.body].tree.triangles[row.triangle].source_face();
   }
-  if (options.sides) find_sides(search, row);
+  if (!options.sides) return;
+  const auto around = [&](const WorldBox& box) { return bound(box) == 0 ? 0 : HUGE_VAL; };
+  visit(of, around, 0, [&](std::uint32_t body) { add_side(body, search, row); });
+}
+
+// Each point's search begins with the triangle that was closest to the one before it in the part. rows: of
+// the first point, and the others at multiples of the stride.
+void ClosestQuery::State::find_part(const ClosestOptions& options, std::uint32_t of, std::size_t first,
+                                    std::size_t last, ClosestSearch& search, ClosestPoint* rows,
+                                    std::size_t stride) const {
+  for (std::size_t i = first; i < last; ++i) {
+    const std::uint32_t body = search.best_body, triangle = search.best_triangle;
+    fetch_ahead(options.points[order.ahead(i)].data());
+    search.begin(options.points[order[i]], options.reach);
+    if (i != first && triangle != kNoIndex) {
+      search.body = body;
+      search.settle(triangle);
+    }
+    find(options, of, search, rows[stride * order[i]]);
+  }
 }
 
 void ClosestQuery::State::count_crossings(std::uint32_t body, ClosestSearch& search,
@@ -257,29 +286,31 @@ void ClosestQuery::State::count_crossings(std::uint32_t body, ClosestSearch& sea
   search.blocks += task.blocks;
 }
 
-void ClosestQuery::State::find_sides(ClosestSearch& search, ClosestPoint& row) const {
-  const double limit = 0;
-  const auto bound = [&](const WorldBox& box) { return distance_to(box, search.point) == 0 ? 0 : HUGE_VAL; };
-  bodies.visit(bound, limit, [&](std::uint32_t body) {
-    if (!search.scene->is_body(body)) return;
-    const SurfaceLabels& surface = surfaces[search.scene->instances[body].asset];
-    if (!surface.any_closed) return;
-    CrossingCount count = {&search.scene->bodies[body],
-                           search.point,
-                           surface.first != kNoIndex ? labels.data() + surface.first : nullptr,
-                           0,
-                           0,
-                           0};
-    count_crossings(body, search, count);
-    row.winding += count.winding;
-    if (count.crossings % 2 != 0) row.within = std::min(row.within, body);
-  });
+// Counts the surfaces of a body that are around the point.
+void ClosestQuery::State::add_side(std::uint32_t body, ClosestSearch& search, ClosestPoint& row) const {
+  const SceneState& scene = *search.scene;
+  if (!scene.is_body(body) || distance_to(scene.boxes[body], search.point) != 0) return;
+  const SurfaceLabels& surface = surfaces[scene.instances[body].asset];
+  if (!surface.any_closed) return;
+  CrossingCount count = {&scene.bodies[body],
+                         search.point,
+                         surface.first != kNoIndex ? labels.data() + surface.first : nullptr,
+                         0,
+                         0,
+                         0};
+  count_crossings(body, search, count);
+  row.winding += count.winding;
+  if (count.crossings % 2 != 0) row.within = std::min(row.within, body);
 }
 
 namespace {
 
 Status check(SceneState& scene, const ClosestOptions& options) {
-  if (options.points.size() >= kNoIndex) return scene.fail(Status::kBadOption, 0);
+  const std::size_t of_each = std::max<std::size_t>(options.bodies.size(), 1);
+  if (options.points.size() > (kNoIndex - 1) / of_each) return scene.fail(Status::kBadOption, 0);
+  for (std::size_t i = 0; i < options.bodies.size(); ++i) {
+    if (!scene.is_body(options.bodies[i])) return scene.fail(Status::kUnknownInstance, i);
+  }
   const Status status = check_distance_options(options.tolerance, options.reach);
   if (status != Status::kOk) return scene.fail(status, 0);
   for (std::size_t i = 0; i < options.points.size(); ++i) {
@@ -291,7 +322,7 @@ Status check(SceneState& scene, const ClosestOptions& options) {
 }  // namespace
 
 Status ClosestQuery::answer(SceneState& scene, const ClosestOptions& options) {
-  const std::size_t count = options.points.size();
+  const std::size_t count = options.points.size(), of_each = std::max<std::size_t>(options.bodies.size(), 1);
   State* const provided = state_.provide();
   if (provided == nullptr) return scene.fail(Status::kOutOfMemory, 0);
   State& state = *provided;
@@ -305,7 +336,7 @@ Status ClosestQuery::answer(SceneState& scene, const ClosestOptions& options) {
     return true;
   };
   if (!state.searches.provide(workers) || !state.order.make(0, static_cast<std::uint32_t>(count), place) ||
-      !rows_.resize(count))
+      !rows_.resize(count * of_each))
     return scene.fail(Status::kOutOfMemory, 0);
   for (std::uint32_t i = 0; i < workers; ++i) {
     ClosestSearch& search = state.searches[i];
@@ -313,18 +344,13 @@ Status ClosestQuery::answer(SceneState& scene, const ClosestOptions& options) {
     search.tolerance = options.tolerance;
     search.blocks = search.by_float64 = 0;
   }
-  // Each point's search begins with the triangle that was closest to the one before it in the part.
   const auto find = [&](std::size_t first, std::size_t last, std::uint32_t worker) {
-    ClosestSearch& search = state.searches[worker];
-    for (std::size_t i = first; i < last; ++i) {
-      const std::uint32_t body = search.best_body, triangle = search.best_triangle;
-      fetch_ahead(options.points[state.order.ahead(i)].data());
-      search.begin(options.points[state.order[i]], options.reach);
-      if (i % kProbesAtOnce != 0 && triangle != kNoIndex) {
-        search.body = body;
-        search.settle(triangle);
+    for (; first < last; first += kProbesAtOnce) {
+      const std::size_t end = std::min(first + kProbesAtOnce, last);
+      for (std::size_t k = 0; k < of_each; ++k) {
+        const std::uint32_t of = options.bodies.empty() ? kNoIndex : options.bodies[k];
+        state.find_part(options, of, first, end, state.searches[worker], rows_.data() + k, of_each);
       }
-      state.find(options, search, rows_[state.order[i]]);
     }
   };
   scene.threads.for_parts(workers, count, kProbesAtOnce, find);

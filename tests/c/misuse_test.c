@@ -281,7 +281,8 @@ static void test_allocators(const char* folder) {
   const tandem_impact_options impacts = {sizeof impacts, 0, 1, 0, still, 3, NULL, 0};
   const tandem_tolerance_options verdicts = {sizeof verdicts, 0, 0, NULL, 0};
   const double place[3] = {2, 0, 0}, along[3] = {-1, 0, 0};
-  const tandem_closest_options closest = {sizeof closest, 0, 1, 0, 0, 0, 0, place, 1};
+  const tandem_closest_options closest = {
+      .struct_size = sizeof closest, .sides = 1, .points = place, .point_count = 1};
   const tandem_ray_options rays = {sizeof rays, TANDEM_ALL_HITS, 0, 0, 0, place, along, 1};
   const uint32_t moving[1] = {1};
   const tandem_pose there = {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, {0.5, 0, 0}};

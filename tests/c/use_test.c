@@ -241,7 +241,6 @@ static void test_building(void) {
 static void test_rows_and_calls(const tandem_allocator* allocator) {
   tandem_asset* cube = build_obj(assets_folder, "box_12.obj", allocator);
   tandem_scene* scene = scene_of(&cube, 1, allocator);
-  tandem_asset_release(cube);
   tandem_instance row[10];
   for (int i = 0; i < 10; ++i) row[i] = at(0.5 * i, 0, 0);
   CHECK_STATUS(tandem_scene_set_threads(scene, 0), TANDEM_OK);
@@ -273,7 +272,8 @@ static void test_rows_and_calls(const tandem_allocator* allocator) {
   const tandem_body_at* there = tandem_scene_bodies_at(scene, &count);
   CHECK(count == 2 && there[0].body == 0 && there[1].point == 0 && there[1].body == 1);
   const double along[] = {0, 0, 1, 1, 0, 0};
-  const tandem_closest_options closest = {sizeof closest, 0, 1, 0, 0, 0, 0, points, 2};
+  const tandem_closest_options closest = {
+      .struct_size = sizeof closest, .sides = 1, .points = points, .point_count = 2};
   const tandem_ray_options rays = {sizeof rays, TANDEM_FIRST_HIT, 0, 0, 0, points, along, 2};
   const tandem_questions probes = {.struct_size = sizeof probes, .closest = &closest, .rays = &rays};
   CHECK_STATUS(tandem_scene_find(scene, &probes), TANDEM_OK);
@@ -281,6 +281,21 @@ static void test_rows_and_calls(const tandem_allocator* allocator) {
   CHECK(count == 2 && nearest[0].upper == 0 && nearest[0].body <= 1 && nearest[1].lower > 50);
   const tandem_ray_hit* hits = tandem_scene_rays(scene, &count);
   CHECK(count == 2 && hits[0].t == 0 && hits[0].body == 0 && hits[1].body == TANDEM_NO_INDEX);
+  tandem_scene* alone = NULL;
+  CHECK_STATUS(tandem_scene_create(allocator, &alone), TANDEM_OK);
+  CHECK_STATUS(tandem_scene_place_alone(alone, NULL), TANDEM_NULL_ARGUMENT);
+  CHECK_STATUS(tandem_scene_place_alone(alone, cube), TANDEM_OK);
+  CHECK_STATUS(tandem_scene_find_rays(alone, &rays), TANDEM_OK);
+  hits = tandem_scene_rays(alone, &count);
+  CHECK(count == 2 && hits[0].t == 0 && hits[0].body == 0 && hits[1].body == TANDEM_NO_INDEX);
+  tandem_scene_destroy(alone);
+  tandem_asset_release(cube);
+  const uint32_t asked[] = {1, 0, 1};
+  const tandem_closest_options of_each = {
+      .struct_size = sizeof of_each, .points = points, .point_count = 2, .bodies = asked, .body_count = 3};
+  CHECK_STATUS(tandem_scene_find_closest(scene, &of_each), TANDEM_OK);
+  nearest = tandem_scene_closest(scene, &count);
+  CHECK(count == 6 && nearest[0].body == 1 && nearest[1].body == 0 && nearest[5].body == 1);
   options.pairs = NULL;
   options.pair_count = 0;
   questions.contained = 1;

@@ -212,6 +212,9 @@ class CDoor final : public Door {
     const std::vector<std::array<double, 3>> points = points_of(options);
     chosen.points = points.empty() ? nullptr : points[0].data();
     chosen.point_count = points.size();
+    const std::vector<std::uint32_t> bodies = options.value("bodies", std::vector<std::uint32_t>{});
+    chosen.bodies = bodies.data();
+    chosen.body_count = bodies.size();
     chosen.sides = flag(options, "sides");
     chosen.limit_reach = options.contains("reach");
     chosen.reach = number(options, "reach", 0);

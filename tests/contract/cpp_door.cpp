@@ -94,7 +94,8 @@ class CppDoor final : public Door {
  private:
   Found closest(const Json& options) {
     const std::vector<std::array<double, 3>> points = points_of(options);
-    ClosestOptions chosen = {.points = points, .sides = flag(options, "sides")};
+    const auto bodies = options.value("bodies", std::vector<std::uint32_t>{});
+    ClosestOptions chosen = {.points = points, .bodies = bodies, .sides = flag(options, "sides")};
     chosen.reach = number(options, "reach", chosen.reach);
     return shown(closest_, closest_.find(*scene_, chosen));
   }

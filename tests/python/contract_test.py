@@ -52,8 +52,9 @@ class Door:
         for name in ("points", "origins", "directions"):
             if name in step:
                 options[name] = np.array(step[name], np.float64).reshape(-1, 3)
-        if "hits" in step:
-            options["hits"] = step["hits"]
+        for name in ("bodies", "hits"):
+            if name in step:
+                options[name] = step[name]
         found = self.found[step["ask"]] = getattr(scene, step["ask"])(**options)
         return found
 
@@ -74,7 +75,7 @@ def expect_found(question, found, expected):
     if question == "pairs":
         pairs = rows = found
     elif question in ("bodies_at", "closest", "rays"):
-        pairs, rows = np.zeros(0), found
+        pairs, rows = np.zeros(0), found.ravel()
     else:
         pairs, rows = found.pairs, getattr(found, question)
     if question == "contacts":

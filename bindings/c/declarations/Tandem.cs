@@ -451,6 +451,8 @@ public unsafe struct tandem_closest_options {
   public double relative_tolerance;
   public double* points;
   public UIntPtr point_count;
+  public uint* bodies;
+  public UIntPtr body_count;
 }
 
 [StructLayout(LayoutKind.Sequential)]
@@ -804,6 +806,7 @@ public static unsafe class Native {
   [DllImport("tandem")] public static extern uint tandem_scene_deform_f64(IntPtr scene, uint asset, double* positions, UIntPtr vertex_count);
   [DllImport("tandem")] public static extern double tandem_scene_looseness(IntPtr scene, uint asset);
   [DllImport("tandem")] public static extern uint tandem_scene_place(IntPtr scene, tandem_instance* instances, UIntPtr count, tandem_pair_filter* filter);
+  [DllImport("tandem")] public static extern uint tandem_scene_place_alone(IntPtr scene, IntPtr asset);
   [DllImport("tandem")] public static extern uint tandem_scene_add(IntPtr scene, tandem_instance* instance, tandem_pair_filter* filter, uint* body);
   [DllImport("tandem")] public static extern uint tandem_scene_move(IntPtr scene, uint* bodies, tandem_pose* poses, UIntPtr count);
   [DllImport("tandem")] public static extern uint tandem_scene_set_motion(IntPtr scene, uint body, uint motion);

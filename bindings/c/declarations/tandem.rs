@@ -671,6 +671,8 @@ pub struct tandem_closest_options {
     pub relative_tolerance: f64,
     pub points: *const f64,
     pub point_count: usize,
+    pub bodies: *const u32,
+    pub body_count: usize,
 }
 
 #[repr(C)]
@@ -893,6 +895,7 @@ extern "C" {
     pub fn tandem_scene_deform_f64(scene: *mut tandem_scene, asset: u32, positions: *const f64, vertex_count: usize) -> tandem_status;
     pub fn tandem_scene_looseness(scene: *const tandem_scene, asset: u32) -> f64;
     pub fn tandem_scene_place(scene: *mut tandem_scene, instances: *const tandem_instance, count: usize, filter: *const tandem_pair_filter) -> tandem_status;
+    pub fn tandem_scene_place_alone(scene: *mut tandem_scene, asset: *mut tandem_asset) -> tandem_status;
     pub fn tandem_scene_add(scene: *mut tandem_scene, instance: *const tandem_instance, filter: *const tandem_pair_filter, body: *mut u32) -> tandem_status;
     pub fn tandem_scene_move(scene: *mut tandem_scene, bodies: *const u32, poses: *const tandem_pose, count: usize) -> tandem_status;
     pub fn tandem_scene_set_motion(scene: *mut tandem_scene, body: u32, motion: u32) -> tandem_status;

@@ -147,7 +147,9 @@ tandem_status read_options(const tandem_bodies_at_options& given, BodiesAtOption
 
 tandem_status read_options(const tandem_closest_options& given, ClosestOptions& options) {
   if (given.limit_reach > 1 || given.sides > 1 || given.reserved != 0) return TANDEM_BAD_OPTION;
-  if (!is_there(given.points, given.point_count)) return TANDEM_NULL_ARGUMENT;
+  if (!is_there(given.points, given.point_count) || !is_there(given.bodies, given.body_count))
+    return TANDEM_NULL_ARGUMENT;
+  options.bodies = {given.bodies, given.body_count};
   options.points = triples(given.points, given.point_count);
   options.tolerance.absolute = given.absolute_tolerance;
   if (given.relative_tolerance != 0) options.tolerance.relative = given.relative_tolerance;
@@ -331,6 +333,13 @@ tandem_status tandem_scene_place(tandem_scene* scene, const tandem_instance* ins
     }
     return status;
   });
+}
+
+tandem_status tandem_scene_place_alone(tandem_scene* scene, tandem_asset* asset) {
+  const tandem_status status = tandem_scene_set_assets(scene, &asset, 1);
+  if (status != TANDEM_OK) return status;
+  const tandem_instance instance = {0, 0, {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, {0, 0, 0}}};
+  return tandem_scene_place(scene, &instance, 1, nullptr);
 }
 
 tandem_status tandem_scene_add(tandem_scene* scene, const tandem_instance* instance,

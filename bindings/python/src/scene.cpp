@@ -226,10 +226,11 @@ class Scene {
     return answer<tandem_scene_find_configurations, tandem_scene_configurations>(options);
   }
 
-  nb::object closest(nb::handle points, nb::handle reach, double absolute_tolerance,
+  nb::object closest(nb::handle points, nb::handle bodies, nb::handle reach, double absolute_tolerance,
                      double relative_tolerance, bool sides) {
     const Turn turn = take_turn();
     const auto coordinates = copy_rows<double>(points);
+    const auto asked = copy_rows<std::uint32_t>(bodies);
     auto options = sized<tandem_closest_options>();
     options.points = coordinates.data();
     options.point_count = coordinates.size() / 3;
@@ -238,6 +239,8 @@ class Scene {
     options.absolute_tolerance = absolute_tolerance;
     options.relative_tolerance = relative_tolerance;
     options.sides = sides;
+    options.bodies = asked.data();
+    options.body_count = asked.size();
     return answer<tandem_scene_find_closest, tandem_scene_closest>(options);
   }
 
@@ -341,7 +344,7 @@ void add_scenes(nb::module_& module) {
       .def("verdicts", &Scene::verdicts, nb::arg(), none())
       .def("bodies_at", &Scene::bodies_at)
       .def("configurations", &Scene::configurations)
-      .def("closest", &Scene::closest, nb::arg(), none(), nb::arg(), nb::arg(), nb::arg())
+      .def("closest", &Scene::closest, nb::arg(), nb::arg(), none(), nb::arg(), nb::arg(), nb::arg())
       .def("rays", &Scene::rays, nb::arg(), nb::arg(), none(), nb::arg());
 }
 

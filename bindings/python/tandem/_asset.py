@@ -5,14 +5,17 @@ import contextlib
 import json
 import math
 import os
-from typing import Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from . import _tandem
-from ._arrays import NotNumbers, number, whole_number
+from ._arrays import NotNumbers, Rows, number, whole_number
 from ._errors import Error, with_path
+
+if TYPE_CHECKING:
+    from ._scene import Scene
 
 __all__ = ["Asset", "Level", "Part"]
 
@@ -83,9 +86,10 @@ class Asset(NotNumbers):
     It never changes, and threads may share it. Made by `Asset.load`, `Asset.from_bytes` and `tandem.build`. It pickles, as its bytes.
     """
 
-    __slots__ = ("_core", "_info", "__weakref__")
+    __slots__ = ("_core", "_info", "_scene", "__weakref__")
     _core: _tandem.Asset
     _info: Info
+    _scene: Scene
 
     def __init__(self) -> None:
         raise TypeError("Asset.load, Asset.from_bytes and tandem.build make assets")
@@ -172,6 +176,31 @@ class Asset(NotNumbers):
         tandem._errors.Error: the asset has no such level or part
         """
         return Asset._of(self._core.levels_from(whole_number(first, "first", 0, _MOST), whole_number(count, "count", 0, _MOST)))
+
+    def closest(self, points: npt.ArrayLike, *, threads: int = 1, **options: Any) -> Rows:
+        """Finds the closest point of the mesh to each of the points, in the mesh file's coordinates: as `Scene.closest` of a scene that has only this body.
+
+        >>> box.closest([[0.5, 0.5, 0.75], [2.0, 0.5, 0.5]], sides=True)["winding"].tolist()
+        [1, 0]
+        """
+        return self._alone(threads).closest(points, **options)
+
+    def rays(self, origins: npt.ArrayLike, directions: npt.ArrayLike, *, threads: int = 1, **options: Any) -> Rows:
+        """Finds where rays meet the mesh, in the mesh file's coordinates: as `Scene.rays` of a scene that has only this body.
+
+        >>> box.rays([-2, 0.25, 0.5], [1, 0, 0], hits="all")["t"].tolist()
+        [2.0, 3.0]
+        """
+        return self._alone(threads).rays(origins, directions, **options)
+
+    def _alone(self, threads: int) -> Scene:
+        """The scene that has only this body, made when it is first asked."""
+        from ._scene import Scene
+
+        if not hasattr(self, "_scene"):
+            self._scene = Scene([self], translation=[0, 0, 0])
+        self._scene.threads = threads
+        return self._scene
 
     def coarsest_level(self, tolerance: float) -> int:
         """The coarsest level whose error_bound is at most `tolerance`, in the mesh's unit; 0 where none is."""

@@ -538,22 +538,31 @@ class Scene:
         """
         return _frombuffer(self._core.bodies_at(floats(points, "points", 3)), BODY_AT)
 
-    def closest(self, points: npt.ArrayLike, *, reach: float | None = None, absolute_tolerance: float = 0.0, relative_tolerance: float = 0.0,
-                sides: bool = False) -> Rows:
+    def closest(self, points: npt.ArrayLike, *, bodies: npt.ArrayLike | None = None, reach: float | None = None, absolute_tolerance: float = 0.0,
+                relative_tolerance: float = 0.0, sides: bool = False) -> Rows:
         """Finds the closest point of the bodies' surfaces to each of the points, (n, 3) or one: array of CLOSEST_POINT, a row for each.
 
         `lower` <= distance <= `upper`, both 0 exactly where the point is on a triangle; `upper` - `lower` is at most the larger of the
         absolute tolerance and the relative one, 0: 1e-6, times `upper`. reach: what is surely farther away has no closest point, its
         `body` is NO_INDEX and `upper` infinite. sides: also `within`, the lowest body that the point is inside of, or NO_INDEX, and
-        `winding`, how often closed surfaces wind around it, both decided exactly.
+        `winding`, how often closed surfaces wind around it, both decided exactly. bodies: numbers (m,); each point is asked about each
+        of these bodies alone, and the array is (n, m).
 
         >>> row = scene.place(translation=[[0, 0, 0], [3, 0, 0]]).closest([0.5, 0.5, 0.75], sides=True)[0]
         >>> round(float(row["upper"]), 9), row["position"].tolist(), int(row["within"]), int(row["winding"])
         (0.25, [0.5, 0.5, 1.0], 0, 1)
+        >>> scene.closest([[0.5, 0.5, 1.5], [4.5, 0.5, 0.5]], bodies=[1, 0])["upper"].round(3).tolist()
+        [[2.55, 0.5], [0.5, 3.5]]
         """
-        return _frombuffer(self._core.closest(floats(points, "points", 3), None if reach is None else amount(reach, "reach", np.inf),
-                                              amount(absolute_tolerance, "absolute_tolerance", np.inf),
-                                              amount(relative_tolerance, "relative_tolerance", np.inf), bool(sides)), CLOSEST_POINT)
+        from_, asked = floats(points, "points", 3), whole_numbers([] if bodies is None else bodies, "bodies")
+        if bodies is not None and asked.ndim != 1:
+            raise ValueError(f"bodies has shape {asked.shape} where (m,) is wanted")
+        if bodies is not None and asked.size == 0:
+            return np.zeros((from_.size // 3, 0), CLOSEST_POINT)
+        found = _frombuffer(self._core.closest(from_, asked, None if reach is None else amount(reach, "reach", np.inf),
+                                               amount(absolute_tolerance, "absolute_tolerance", np.inf),
+                                               amount(relative_tolerance, "relative_tolerance", np.inf), bool(sides)), CLOSEST_POINT)
+        return found if bodies is None else found.reshape(-1, asked.size)
 
     def rays(self, origins: npt.ArrayLike, directions: npt.ArrayLike, *, reach: float | None = None, hits: str = "first") -> Rows:
         """Finds where rays origin + t direction, 0 <= t <= reach, meet the bodies: array of RAY_HIT.

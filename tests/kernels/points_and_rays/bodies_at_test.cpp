@@ -41,7 +41,8 @@ TEST(BodiesAt, AreThoseWhoseBoxesContainThePoint) {
   }
   BodiesAtQuery query;
   ASSERT_EQ(query.find(scene, {.points = points}), Status::kOk);
-  EXPECT_EQ(query.counters(), (BodiesAtCounters{200, 200 * 80}));
+  EXPECT_EQ(query.counters().points, 200u);
+  EXPECT_LT(query.counters().boxes, 200u * 80u);
   std::vector<BodyAt> expected;
   for (std::uint32_t p = 0; p < 200; ++p) {
     for (std::uint32_t body = 0; body < 80; ++body) {

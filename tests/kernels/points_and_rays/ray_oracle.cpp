@@ -1,6 +1,7 @@
 #include "kernels/points_and_rays/ray_oracle.h"
 
 #include <CGAL/Gmpq.h>
+#include <CGAL/Interval_nt.h>
 
 #include <array>
 #include <utility>
@@ -35,6 +36,29 @@ bool is_on_segment(const RationalVector& x, const RationalVector& p, const Ratio
 }
 
 }  // namespace
+
+// Of det(d, p_i, e_i), two have opposite signs.
+bool surely_passes_by(const double* origin, const double* direction, const double (*corner)[3]) {
+  using Interval = CGAL::Interval_nt<false>;
+  const Interval::Protector rounding;
+  Interval p[3][3];
+  for (int i = 0; i < 3; ++i) {
+    for (int k = 0; k < 3; ++k) p[i][k] = Interval(corner[i][k]) - Interval(origin[k]);
+  }
+  bool above = false, below = false;
+  for (int i = 0; i < 3; ++i) {
+    const Interval* const q = p[(i + 1) % 3];
+    Interval volume = 0;
+    // p x e is p x q, as e = q - p.
+    for (int k = 0; k < 3; ++k) {
+      const int l = (k + 1) % 3, m = (k + 2) % 3;
+      volume += Interval(direction[k]) * (p[i][l] * q[m] - p[i][m] * q[l]);
+    }
+    above = above || volume.inf() > 0;
+    below = below || volume.sup() < 0;
+  }
+  return above && below;
+}
 
 struct RayOracle::Found {
   RationalVector corner[3];

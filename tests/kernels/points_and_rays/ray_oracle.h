@@ -3,6 +3,9 @@
 
 namespace tandem {
 
+/// Whether a ray's line passes a triangle by, which CGAL's intervals prove; false: they do not.
+bool surely_passes_by(const double* origin, const double* direction, const double (*corner)[3]);
+
 /// Where a ray first meets a triangle, by rational numbers: the least of all parameters at which the ray may
 /// enter the hull of the corners and is in it.
 class RayOracle {

@@ -427,6 +427,10 @@ TANDEM_API double tandem_scene_looseness(const tandem_scene* scene, uint32_t ass
 TANDEM_API tandem_status tandem_scene_place(tandem_scene* scene, const tandem_instance* instances,
                                             size_t count, const tandem_pair_filter* filter);
 
+/// Makes this a scene of one body, the asset at the identity, for questions about the asset alone. Result: as
+/// of tandem_scene_set_assets() and tandem_scene_place().
+TANDEM_API tandem_status tandem_scene_place_alone(tandem_scene* scene, tandem_asset* asset);
+
 /// Adds a body, whose number becomes *body: the lowest that is free. filter: or null; its arrays have one
 /// entry, and it excludes no pairs (else TANDEM_BAD_OPTION): those that tandem_scene_place() was given stay.
 /// Result: as of tandem_scene_place(). After an error nothing has changed, and *body is TANDEM_NO_INDEX.
@@ -839,6 +843,8 @@ typedef struct tandem_closest_options {
   double relative_tolerance;  ///< 0: 1e-6; at the finest 2^-48
   const double* points;       ///< in the world, x, y, z of each
   size_t point_count;
+  const uint32_t* bodies;  ///< if there are any: each point is asked about each of these bodies alone
+  size_t body_count;
 } tandem_closest_options;
 
 /// The closest point of the bodies of a scene (docs/points_and_rays.md).
@@ -859,11 +865,12 @@ typedef struct tandem_closest_counters {
 } tandem_closest_counters;
 
 /// Finds the closest points of the bodies' surfaces. Result: TANDEM_OUT_OF_RANGE, where `where` is the point;
+/// TANDEM_UNKNOWN_INSTANCE, where it is the place in `bodies`;
 /// TANDEM_BAD_TOLERANCE or TANDEM_BAD_REACH where a tolerance or the reach is negative or NaN;
 /// TANDEM_NO_TOPOLOGY, where sides are asked for and `where` is an asset whose file has none.
 TANDEM_API tandem_status tandem_scene_find_closest(tandem_scene* scene,
                                                    const tandem_closest_options* options);
-/// Returns the row of each point.
+/// Returns the row of each point, or where bodies were named, of each point and each of these.
 TANDEM_API const tandem_closest_point* tandem_scene_closest(const tandem_scene* scene, size_t* count);
 
 /// The hit of the least parameter of each ray; some hit of each; or all hits.

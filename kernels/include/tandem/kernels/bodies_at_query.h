@@ -21,7 +21,7 @@ struct BodiesAtOptions {
 
 struct BodiesAtCounters {
   std::uint64_t points = 0;
-  std::uint64_t boxes = 0;  ///< that were tested
+  std::uint64_t boxes = 0;  ///< of bodies or of several, that were tested
 
   friend bool operator==(const BodiesAtCounters&, const BodiesAtCounters&) = default;
 };
@@ -33,8 +33,15 @@ class BodiesAtQuery : public Answer<BodyAt, BodiesAtCounters> {
   using Options = BodiesAtOptions;
 
   /// rows() ascend by point, then by body. Result: kOk; kOutOfRange, where where() of the scene is the point
-  /// that has a coordinate that is NaN or beyond kLargestWorldCoordinate, or kOutOfMemory.
+  /// that has a coordinate that is NaN or beyond kLargestWorldCoordinate; kBadOption where there are 2^32 - 1
+  /// points or more; or kOutOfMemory.
   Status find(Scene& scene, const BodiesAtOptions& options);
+
+ private:
+  struct State;
+  Status answer(SceneState& scene, const BodiesAtOptions& options);
+
+  Kept<State> state_;
 };
 
 }  // namespace tandem

@@ -25,6 +25,9 @@ struct ClosestPoint {
 
 struct ClosestOptions {
   std::span<const std::array<double, 3>> points;  ///< in the world
+  /// If there are any, each point is asked about each of these bodies alone, and not about all together:
+  /// rows() ascend by point, then by the place of the body in this list.
+  std::span<const std::uint32_t> bodies = {};
   DistanceTolerance tolerance = {};
   /// Points that are surely farther away than this have no closest point: lower >= reach, upper is infinite.
   double reach = std::numeric_limits<double>::infinity();
@@ -44,7 +47,8 @@ struct ClosestCounters {
   friend bool operator==(const ClosestCounters&, const ClosestCounters&) = default;
 };
 
-/// Finds the closest points of the bodies' surfaces, a row for each point in the order of the points. The
+/// Finds the closest points of the bodies' surfaces, a row for each point in the order of the points, or for
+/// each point and each body that the options name. The
 /// geometry is that of ContactQuery: the posed vertices in float64. The distance is certified: exact
 /// arithmetic cannot refute the interval, which is as narrow as the tolerance asks for. Of triangles whose
 /// distances the tolerance does not tell apart, it is unspecified which is named. The filter is not asked,
@@ -55,8 +59,9 @@ class ClosestQuery : public Answer<ClosestPoint, ClosestCounters> {
 
   /// Result: kOk; kOutOfRange, where where() of the scene is the first point that has a coordinate which is
   /// NaN or beyond kLargestWorldCoordinate; kBadTolerance or kBadReach where a tolerance or the reach is
-  /// negative or NaN; kBadOption where there are 2^32 - 1 points or more; kNoTopology, where sides are asked
-  /// for and where() is an asset whose file has none; kOutOfMemory or kCannotStartThread.
+  /// negative or NaN; kBadOption where there are 2^32 - 1 rows or more; kUnknownInstance, where where() is
+  /// the place in `bodies` of one that does not exist; kNoTopology, where sides are asked for and where() is
+  /// an asset whose file has none; kOutOfMemory or kCannotStartThread.
   Status find(Scene& scene, const ClosestOptions& options);
 
  private:

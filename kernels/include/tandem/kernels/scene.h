@@ -97,6 +97,14 @@ class Scene {
   /// kOutOfMemory or kCannotStartThread. After an error there are no bodies.
   Status place(std::span<const Instance> instances, const PairFilter& filter = {});
 
+  /// Makes this a scene of one body, the asset at the identity, for questions about the asset alone. Result:
+  /// as of set_assets() and place().
+  Status place_alone(const AssetView& asset) {
+    const Status status = set_assets({&asset, 1});
+    const Instance instance = {0, kIdentityPose};
+    return status == Status::kOk ? place({&instance, 1}) : status;
+  }
+
   /// Adds a body; `body` becomes its number, the lowest that is free. Result: as of place(). After an error
   /// nothing has changed.
   Status add(const Instance& instance, std::uint32_t& body, const BodyFilter& filter = {});

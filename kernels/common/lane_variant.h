@@ -12,7 +12,6 @@ struct BoundedBlockPair;
 struct NearestSoFar;
 struct ManifoldLanes;
 struct RefitTree;
-struct RefitSurfaces;
 struct RayTask;
 struct RayStream;
 struct PointTask;
@@ -24,7 +23,7 @@ struct LaneVariant {
   bool (*narrow_phase_without_neighbours)(const PairTask&, ContactSink&);
   void (*nearest_phase)(const NearestTask&, const BoundedBlockPair*, std::uint32_t, NearestSoFar&);
   const ManifoldLanes* manifold_lanes;
-  RefitSurfaces (*refit)(const RefitTree&, const float*);
+  double (*refit)(const RefitTree&, const float*);
   void (*ray_walk)(RayTask&);
   void (*ray_stream_walk)(const RayStream&);
   void (*point_walk)(PointTask&);

@@ -146,11 +146,21 @@ struct Lanes {
 #if defined(__SSE2__)
     if constexpr (kCount == 4) return {_mm_max_ps(b.v, a.v)};
 #endif
+#if defined(__AVX512F__)
+    if constexpr (kCount == 16)
+      return {reinterpret_cast<Floats>(
+          _mm512_maskz_max_ps(0xFFFF, reinterpret_cast<__m512>(b.v), reinterpret_cast<__m512>(a.v)))};
+#endif
     return select(less(a, b), b, a);
   }
   TANDEM_INLINE friend Lanes lesser(const Lanes& a, const Lanes& b) {
 #if defined(__SSE2__)
     if constexpr (kCount == 4) return {_mm_min_ps(b.v, a.v)};
+#endif
+#if defined(__AVX512F__)
+    if constexpr (kCount == 16)
+      return {reinterpret_cast<Floats>(
+          _mm512_maskz_min_ps(0xFFFF, reinterpret_cast<__m512>(b.v), reinterpret_cast<__m512>(a.v)))};
 #endif
     return select(less(b, a), b, a);
   }

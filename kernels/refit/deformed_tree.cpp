@@ -26,15 +26,16 @@ float rounded_up(double x) {
   return -rounded_down(-x);
 }
 
-double surface(const Block& block) {
-  double sum = 0;
-  for (int i = 0; i < kNodesPerBlock && block.kind[i] != NodeKind::imaginary; ++i) {
-    const double x = static_cast<double>(block.half_extent[0][i]),
-                 y = static_cast<double>(block.half_extent[1][i]),
-                 z = static_cast<double>(block.half_extent[2][i]);
-    sum += x * y + y * z + z * x;
-  }
-  return sum;
+/// An eighth of the surface of a box.
+double surface_of(const Box& box) {
+  const double x = static_cast<double>(box.half_extent[0]), y = static_cast<double>(box.half_extent[1]),
+               z = static_cast<double>(box.half_extent[2]);
+  return (x * y + y * z) + z * x;
+}
+
+void add_surfaces(const Block& block, double (&of_node)[kNodesPerBlock]) {
+  for (int i = 0; i < kNodesPerBlock && block.kind[i] == NodeKind::internal; ++i)
+    of_node[i] += surface_of(box_of(block, i));
 }
 
 /// Hands each coordinate of a leaf's corners to store(corner, axis, coordinate). Result: the leaf's box.
@@ -55,8 +56,8 @@ Box move_leaf(const CornerSources& sources, const Real* positions, const Store& 
   return enclose(lower, upper);
 }
 
-RefitSurfaces refit_scalar(const RefitTree& tree, const float* positions) {
-  RefitSurfaces surfaces;
+double refit_scalar(const RefitTree& tree, const float* positions) {
+  double of_node[kNodesPerBlock] = {};
   for (std::uint32_t b = tree.block_count; b-- > 0;) {
     Block& block = tree.blocks[b];
     const bool leaves = block.is_leaf_block();
@@ -67,13 +68,9 @@ RefitSurfaces refit_scalar(const RefitTree& tree, const float* positions) {
       const auto store = [&](int c, int k, float x) { tree.triangles[below].corner[c].position[k] = x; };
       set_node(block, i, move_leaf(tree.sources[below], positions, store), below, NodeKind::leaf);
     }
-    (leaves ? surfaces.of_leaves : surfaces.of_inner) += surface(block);
+    add_surfaces(block, of_node);
   }
-  return surfaces;
-}
-
-double ratio(const RefitSurfaces& surfaces) {
-  return surfaces.of_leaves > 0 ? surfaces.of_inner / surfaces.of_leaves : 0;
+  return sum_of(of_node);
 }
 
 Refit best_refit() {
@@ -137,17 +134,22 @@ Status DeformedTree::begin(const LevelView& rest) {
   level_.oriented_blocks = nullptr;
   level_.error_bound = 0;
   level_.number = 0;
-  RefitSurfaces at_rest;
-  for (std::size_t b = blocks_.size(); b-- > 0;)  // in the order of refit()
-    (blocks_[b].is_leaf_block() ? at_rest.of_leaves : at_rest.of_inner) += surface(blocks_[b]);
-  surface_at_rest_ = ratio(at_rest);
+  double of_node[kNodesPerBlock] = {};
+  for (std::size_t b = blocks_.size(); b-- > 0;)
+    add_surfaces(blocks_[b], of_node);  // in the order of refit()
+  surface_at_rest_ = by_root(sum_of(of_node));
   return Status::kOk;
 }
 
-RefitSurfaces DeformedTree::refit_by(Refit way, const float* positions) {
-  const RefitSurfaces surfaces =
+double DeformedTree::by_root(double surfaces) const {
+  const double of_root = surface_of(enclose(blocks_[0]));
+  return of_root > 0 ? surfaces / of_root : 0;
+}
+
+double DeformedTree::refit_by(Refit way, const float* positions) {
+  const double surfaces =
       way({blocks_.data(), triangles_.data(), sources_.data(), level_.block_count}, positions);
-  surface_ = ratio(surfaces);
+  surface_ = by_root(surfaces);
   return surfaces;
 }
 

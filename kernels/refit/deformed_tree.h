@@ -23,8 +23,9 @@ class DeformedTree : public Allocated {
   Status refit(std::span<const float> positions);
   Status refit(std::span<const double> positions);
 
-  /// Refits by a way of the caller's. positions: as of refit(), or null, where the leaves' boxes stay.
-  RefitSurfaces refit_by(Refit way, const float* positions);
+  /// Refits by a way of the caller's, and returns what that returns. positions: as of refit(), or null, where
+  /// the leaves' boxes stay.
+  double refit_by(Refit way, const float* positions);
 
   /// The level, at the positions of the last refit(). Its pointers stay until begin() is called again.
   const LevelView& level() const { return level_; }
@@ -33,12 +34,13 @@ class DeformedTree : public Allocated {
   /// are float32 numbers.
   const double (&rounding() const)[3] { return rounding_; }
 
-  /// The surface of all inner boxes divided by that of all leaves' boxes, by the same of the tree that
+  /// The surface of all inner boxes divided by that of the box around the tree, by the same of the tree that
   /// begin() was given; 1 where either has no surface.
   double looseness() const;
 
  private:
   void refit_leaf(Block& block, int node, const double* positions);
+  double by_root(double surfaces) const;
 
   Buffer<Block> blocks_;
   Buffer<Triangle> triangles_;

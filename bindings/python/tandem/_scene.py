@@ -340,8 +340,8 @@ class Scene:
         self._core.deform(whole_number(asset, "asset", 0, _MOST), array, array.dtype == np.float64)
 
     def looseness(self, asset: int) -> float:
-        """How much looser the tree of a deformed asset is than as it was built, by the surface of its boxes: 2 and more tells that triangles were scattered,
-        and that an asset built anew of the positions pays. 1 where the asset is not deformed."""
+        """How much looser the tree of a deformed asset is than as it was built: the surface of its inner boxes by that of the box around all of them, relative to
+        the same of the asset. Above 1.75 an asset that is built anew of the positions may pay. 1 where the asset is not deformed."""
         return self._core.looseness(whole_number(asset, "asset", 0, _MOST))
 
     def set_motion(self, body: int, motion: int) -> None:

@@ -376,5 +376,43 @@ TEST(Deform, ErrorsChangeNothing) {
   EXPECT_EQ(query.rows().size(), before);
 }
 
+/// How many block pairs two such bodies look at that stand a little apart from each other.
+std::uint64_t block_pairs(const AssetView& view, const std::vector<float>* positions, double& looseness) {
+  Scene scene;
+  EXPECT_EQ(scene.set_assets({{view}}), Status::kOk);
+  if (positions != nullptr) EXPECT_EQ(scene.deform(0, *positions), Status::kOk);
+  looseness = scene.looseness(0);
+  Pose beside = kIdentityPose;
+  beside.translation[0] = 0.11, beside.translation[1] = 0.07, beside.translation[2] = 0.05;
+  const Instance instances[2] = {{0, kIdentityPose}, {0, beside}};
+  EXPECT_EQ(scene.place(instances), Status::kOk);
+  ContactQuery query;
+  EXPECT_EQ(query.find(scene), Status::kOk);
+  return query.counters().block_pairs;
+}
+
+TEST(Deform, ALooseTreeTakesMoreBlockPairsThanOneOfThePositions) {
+  const Mesh round = welded(sphere(1, 4));
+  const Bytes at_rest(make_refittable_file(round));
+  double loosenesses[2], ratios[2];
+  for (std::size_t twisted = 0; twisted < 2; ++twisted) {
+    Mesh mesh = round;  // an ellipse along z, whose upper end turns by three turns more than the lower one
+    for (auto& [x, y, z] : mesh.points) {
+      const float angle = twisted != 0 ? 9.4f * z : 0, c = std::cos(angle), s = std::sin(angle), px = x;
+      x = c * px - 0.2f * s * y;
+      y = s * px + 0.2f * c * y;
+    }
+    const std::vector<float> positions = single(positions_of(mesh));
+    const auto refitted =
+        static_cast<double>(block_pairs(at_rest.check().asset, &positions, loosenesses[twisted]));
+    const Bytes built(make_refittable_file(mesh));
+    double of_built;
+    ratios[twisted] = refitted / static_cast<double>(block_pairs(built.check().asset, nullptr, of_built));
+    EXPECT_EQ(of_built, 1);
+  }
+  EXPECT_TRUE(loosenesses[0] < 1.75 && ratios[0] < 1.2) << loosenesses[0] << " " << ratios[0];
+  EXPECT_TRUE(loosenesses[1] > 1.75 && ratios[1] > 1.2) << loosenesses[1] << " " << ratios[1];
+}
+
 }  // namespace
 }  // namespace tandem::test

@@ -413,10 +413,10 @@ TANDEM_API tandem_status tandem_scene_deform(tandem_scene* scene, uint32_t asset
 TANDEM_API tandem_status tandem_scene_deform_f64(tandem_scene* scene, uint32_t asset, const double* positions,
                                                  size_t vertex_count);
 
-/// How much looser the tree of a deformed asset is than as it was built: its inner boxes' surface by that of
-/// its leaves' boxes, divided by the same of the file's tree. 2 and more tells that triangles
-/// were scattered, and that an asset built anew of the positions pays. 1 where the asset is not deformed, or
-/// there is none.
+/// Returns how much looser the tree of a deformed asset is than as it was built: the surface of its inner
+/// boxes by that of the box around all of them, divided by the same of the file's tree. Above 1.75 queries
+/// most likely look at 1.2 times as many block pairs as in a tree that is built for the positions, so a new
+/// one may pay. 1 where the asset is not deformed, or there is none.
 TANDEM_API double tandem_scene_looseness(const tandem_scene* scene, uint32_t asset);
 
 /// Places all bodies anew; those that stand as before cost next to nothing. filter: or null. Result:

@@ -96,7 +96,7 @@ def test_contacts_that_have_no_room_are_counted():
     model = cups()
     m, d, _ = made(model, 1, naconmax=3, nconmax=3)
     qpos = model.qpos0.copy()
-    qpos[7:10] = 0, 0, 0.139
+    qpos[14:17] = 0.2, 0, 0.1  # the box is in the wall of the cup
     d.qpos.assign(qpos.astype("f4")[None])
     mujoco_warp.kinematics(m, d)
     mujoco_warp.collision(m, d)

@@ -139,7 +139,7 @@ def write_touches(report: wp.array[Report], manifolds: wp.array[Manifold], point
         if k == first and made.depth > wp.float64(0.0) and point.normal == made.normal:
             share = wp.max(wp.float64(0.0), wp.float64(1.0) - wp.float64(2.0) * second / made.depth)
             way = share * (made.centre - point.position)
-            touch.position = point.position + way - wp.dot(way, point.normal) * point.normal
+            touch.position = point.position + (way - wp.dot(way, point.normal) * point.normal)
         touches[k] = touch
 
 
@@ -227,7 +227,7 @@ class _OnGpu:
             return wp.array(np.ascontiguousarray(values, np.uint32), dtype=wp.uint32, device=of.device)
 
         self._cuda, self._of, self._most_points = cuda, of, most_points
-        stream, device = wp.get_stream(of.device), of.device.ordinal
+        stream, device = self._stream(), of.device.ordinal
         self._query = cuda.Query(assets, device=device, contents="manifolds", stream=stream)
         self._instances = self._query.instances(on_gpu(asset), of.pose, stream=stream)
         self._pairs = None if asked is None else on_gpu(asked)
@@ -245,8 +245,11 @@ class _OnGpu:
         self._query.reserve(instances=len(self._instances), **self._room, sorted=True, grouped=True, most_points=self._most_points, match_previous=False)
         self.touches: Any = wp.zeros(self._room["points"], dtype=Touch, device=self._of.device)
 
+    def _stream(self) -> Any:
+        return wp.get_stream(self._of.device) if self._of.device.is_cuda else None  # a test's stand-in for a GPU has none
+
     def find(self) -> int | None:
-        stream, is_captured = wp.get_stream(self._of.device), self._of.device.is_capturing
+        stream, is_captured = self._stream(), self._of.device.is_capturing
         while True:
             queued = self._query.enqueue(self._instances, pairs=self._pairs, filter=self._filter, stream=stream)
             self._write(queued)

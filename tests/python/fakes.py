@@ -1,5 +1,10 @@
-"""What stands for arrays and streams of a GPU where there is none."""
+"""What stands for arrays, streams and queries of a GPU where there is none."""
 import ctypes
+import types
+
+import numpy as np
+
+import tandem
 
 
 class Tensor(ctypes.Structure):
@@ -41,3 +46,67 @@ class OwnStream:
 
     def __init__(self, number):
         self.ptr = number
+
+
+class Cuda:
+    """The parts of tandem.cuda that a door to a simulator takes, for arrays in CPU memory: a scene of the CPU answers."""
+
+    class TooLittleRoom(Exception):
+        def __init__(self, **needed):
+            super().__init__(needed)
+            vars(self).update({"undecided": 0} | needed)
+
+    @staticmethod
+    def Filter(*, device, stream, **columns):
+        return tandem.Filter(**{name: None if column is None else np.asarray(column) for name, column in columns.items()})
+
+    class Query:
+        def __init__(self, assets, *, device, contents, stream):
+            self.assets, self.reserved = assets, []
+
+        def instances(self, asset, pose, *, stream):
+            return Bodies(asset, pose)
+
+        def reserve(self, **room):
+            self.reserved.append(room)
+
+        def enqueue(self, bodies, *, pairs, filter, stream):
+            pose, room = bodies.pose.numpy(), self.reserved[-1]
+            scene = tandem.Scene(self.assets, asset=bodies.asset.numpy(), rotation=pose[:, :9].reshape(-1, 3, 3), translation=pose[:, 9:], filter=filter)
+            found = scene.contacts(pairs=None if pairs is None else pairs.numpy())
+            made = scene.manifolds(most_points=room["most_points"], match_previous=room["match_previous"])
+            needed = {"pairs": len(found.pairs), "contacts": len(found.contacts), "manifolds": len(made.manifolds), "points": len(made.points)}
+            return Queued(found.pairs, made, room, needed)
+
+
+class Bodies:
+    def __init__(self, asset, pose):
+        self.asset, self.pose = asset, pose
+
+    def __len__(self):
+        return len(self.asset)
+
+
+class Room:
+    """Rows in room for more."""
+
+    def __init__(self, rows, count):
+        self.rows = np.zeros(count, rows.dtype)
+        self.rows[:len(rows)] = rows[:count]
+        self.words = types.SimpleNamespace(pointer=self.rows.ctypes.data)
+
+    def __len__(self):
+        return len(self.rows)
+
+
+class Queued:
+    def __init__(self, pairs, made, room, needed):
+        self.needed, self.fits = needed, all(needed[name] <= room[name] for name in needed)
+        report = np.zeros(1, [("status", "u4"), ("complete", "u4"), ("needed", "u4", 6), ("manifolds", "u4"), ("points", "u4"), ("counters", "u8", 6)])
+        report["complete"], report["manifolds"], report["points"] = self.fits, needed["manifolds"] if self.fits else 0, needed["points"] if self.fits else 0
+        self.pairs, self.manifold_report = Room(pairs, room["pairs"]), Room(report, 1)
+        self.manifolds, self.points = Room(made.manifolds, room["manifolds"]), Room(made.points, room["points"])
+
+    def wait(self, stream=None):
+        if not self.fits:
+            raise Cuda.TooLittleRoom(**self.needed)

@@ -4,6 +4,7 @@ import pathlib
 import numpy as np
 import pytest
 
+import fakes
 import solids
 import tandem
 
@@ -11,6 +12,7 @@ newton = pytest.importorskip("newton", reason="needs the package newton")
 import warp as wp  # noqa: E402
 
 import tandem.newton  # noqa: E402
+from tandem import _warp  # noqa: E402
 
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)
 
@@ -215,3 +217,43 @@ def test_a_pose_that_is_not_a_number_is_an_error():
     model = builder_of((solids.box(1, 1, 0.1),), (solids.ball(0.1), (0, 0, np.nan), UPRIGHT)).finalize()
     with pytest.raises(tandem.Error):
         collide(model)
+
+
+@pytest.mark.parametrize("named", (False, True))
+def test_the_way_of_a_gpu_has_the_points_of_a_cpu(named):
+    """On arrays in CPU memory, to the last bit: of pairs that the query finds by worlds, or that are named; from too little room on."""
+    world = builder_of(*((solids.ball(0.1), (0.17 * i, 0.02 * i, 0), turn((1, i, 0), i)) for i in range(4)), (solids.box(0.3, 0.1, 0.05), (0.2, 0, 0.1), UPRIGHT))
+    builder = newton.ModelBuilder()
+    for _ in range(40):
+        builder.add_world(world)
+    model = builder.finalize()
+    pipeline = tandem.newton.CollisionPipeline(model)
+    count = pipeline.collide(model.state(), pipeline.contacts())
+    assert count > 1000
+    touches = pipeline._touches
+    expected = touches.touches.numpy()[:count]
+    columns = {"group": np.ones(200, np.uint32), "mask": np.ones(200, np.uint32), "world": np.repeat(np.arange(40, dtype=np.uint32), 5), "excluded": np.empty((0, 2), np.uint32)}
+    asked = np.unique(np.stack([expected["a"], expected["b"]], axis=1), axis=0) if named else None
+    assets, asset = pipeline.assets, np.array(pipeline._asset)
+    gpu = _warp._OnGpu(fakes.Cuda, touches, assets, asset, asked, None if named else columns, 7)
+    gpu._room = dict.fromkeys(gpu._room, 3) | ({"pairs": len(asked)} if named else {})
+    gpu._reserve()
+    assert gpu.find() == count and len(gpu._query.reserved) > 2
+    shown = gpu.touches.numpy()[:count]
+    for name in expected.dtype.names:  # numbers to the last bit, but that 0 may be -0
+        assert np.array_equal(shown[name], expected[name])
+
+
+def test_pairs_that_may_not_collide_are_left_out():
+    """Worlds of shapes of which some filter each other, and a shape that is in all worlds: the pairs that are asked about are the model's."""
+    world = builder_of(*((solids.ball(0.1), (0.01 * i, 0, 0), UPRIGHT) for i in range(5)))
+    world.add_shape_collision_filter_pair(0, 3)
+    builder = newton.ModelBuilder()
+    builder.add_shape_mesh(-1, mesh=mesh_of(solids.box(1, 1, 0.1)))
+    for _ in range(6):
+        builder.add_world(world)
+    model = builder.finalize()
+    contacts, _ = collide(model)
+    found = {tuple(sorted(pair)) for pair in zip(rows(contacts, "shape0").tolist(), rows(contacts, "shape1").tolist())}
+    assert found == {tuple(sorted(pair)) for pair in model.shape_contact_pairs.numpy().tolist()}
+    assert len(found) == 6 * (10 - 1 + 5)

@@ -28,17 +28,23 @@ class Bytes {
   throw nanobind::value_error("a buffer does not hold whole rows");
 }
 
-/// A copy of an array's rows, which other threads cannot change while the interpreter runs them. Its data()
-/// is not null, which stands for no array, also where there are no rows.
+/// Copies an array's rows, which other threads cannot change in the copy while the interpreter runs them. Its
+/// data() is not null, which stands for no array, also where there are no rows.
 template <typename Row>
-std::vector<Row> copy_rows(nanobind::handle object) {
+void copy_rows(nanobind::handle object, std::vector<Row>& copy) {
   const Bytes bytes(object);
   if (bytes.size() % sizeof(Row) != 0) throw_broken_rows();
   const Row* first = static_cast<const Row*>(bytes.data());
   const std::size_t count = bytes.size() / sizeof(Row);
-  std::vector<Row> copy;
   copy.reserve(count + 1);
   copy.assign(first, first + count);
+}
+
+/// Does the same in new memory.
+template <typename Row>
+std::vector<Row> copy_rows(nanobind::handle object) {
+  std::vector<Row> copy;
+  copy_rows(object, copy);
   return copy;
 }
 

@@ -209,16 +209,16 @@ class Scene {
     return answer<tandem_scene_find_bodies_at, tandem_scene_bodies_at>(options);
   }
 
-  nb::object configurations(nb::handle bodies, nb::handle instances, double within, std::uint32_t find,
+  nb::object configurations(nb::handle bodies, nb::handle poses, double within, std::uint32_t find,
                             double absolute_tolerance, double relative_tolerance) {
     const Turn turn = take_turn();
     const auto moving = copy_rows<std::uint32_t>(bodies);
-    const std::vector<tandem_pose> places = poses_of(instances);
+    copy_rows(poses, configurations_);
     auto options = sized<tandem_configuration_options>();
     options.bodies = moving.data();
     options.body_count = moving.size();
-    options.poses = places.data();
-    options.pose_count = places.size();
+    options.poses = configurations_.data();
+    options.pose_count = configurations_.size();
     options.within = within;
     options.find = find;
     options.absolute_tolerance = absolute_tolerance;
@@ -314,6 +314,7 @@ class Scene {
 
   std::unique_ptr<tandem_scene, decltype(&tandem_scene_destroy)> scene_{nullptr, tandem_scene_destroy};
   std::atomic<bool> busy_ = false;
+  std::vector<tandem_pose> configurations_;  // the memory is kept, since new pages cost as much as the copy
   bool contacts_asked_ = false;  // since bodies were last changed
 };
 

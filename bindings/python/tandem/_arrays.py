@@ -206,13 +206,7 @@ def instances(asset: npt.ArrayLike = 0, rotation: Rotations | None = None, trans
     if transform is not None:
         if rotation is not None or translation is not None:
             raise TypeError("transform stands instead of rotation and translation, not beside them")
-        matrices = floats(transform, "transform", 4, 4)
-        last = matrices[..., 3, :]
-        if not (last == _LAST_ROW).all():
-            wrong = ~(np.abs(last - _LAST_ROW).max(axis=-1) <= 1e-6)
-            if wrong.any():
-                raise ValueError(f"transform: the last row of matrix {int(np.flatnonzero(wrong)[0])} is not 0, 0, 0, 1")
-        matrices, translations = matrices[..., :3, :3], matrices[..., :3, 3]
+        matrices, translations = _parts_of(transform)
     else:
         as_matrix = getattr(rotation, "as_matrix", None)
         given: Any = as_matrix() if callable(as_matrix) else rotation
@@ -232,6 +226,36 @@ def instances(asset: npt.ArrayLike = 0, rotation: Rotations | None = None, trans
     made["asset"] = numbers
     made["rotation"] = matrices
     made["translation"] = translations
+    return made
+
+
+def _parts_of(transform: npt.ArrayLike) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+    """The rotations and translations of matrices, (4, 4) or (n, 4, 4)."""
+    matrices = floats(transform, "transform", 4, 4)
+    last = matrices[..., 3, :]
+    if not (last == _LAST_ROW).all():
+        wrong = ~(np.abs(last - _LAST_ROW).max(axis=-1) <= 1e-6)
+        if wrong.any():
+            raise ValueError(f"transform: the last row of matrix {int(np.flatnonzero(wrong)[0])} is not 0, 0, 0, 1")
+    return matrices[..., :3, :3], matrices[..., :3, 3]
+
+
+def poses_of(pose: Any, rotation: Any, translation: Any, transform: Any) -> npt.NDArray[np.float64]:
+    """The poses of a call, (n, 4, 3): the rows of the rotation, then the translation, as the extension takes them. A float64 array `pose`, (n, 4, 3) or (n, 12), is
+    that already."""
+    if pose is not None:
+        if rotation is not None or translation is not None or transform is not None:
+            raise TypeError("pose stands instead of rotation, translation and transform, not beside them")
+        given = _array(pose, "pose", "numbers")
+        return floats(given.reshape(-1, 4, 3) if given.shape[1:] == (12,) else given, "pose", 4, 3)
+    if transform is not None and rotation is None and translation is None:
+        matrices, translations = _parts_of(transform)
+    else:
+        rows = instances_of(None, None, rotation, translation, transform)
+        matrices, translations = rows["rotation"], rows["translation"]
+    made = np.empty((*matrices.shape[:-2], 4, 3))
+    made[..., :3, :] = matrices
+    made[..., 3, :] = translations
     return made
 
 

@@ -35,9 +35,12 @@ make_device = _cuda.make_device  # for tandem.Scene
 
 _MODES = ("exact", "fast", "boxes")
 _CONTENTS = ("all", "exact", "manifolds")
+_MOST = (1 << 31) - 1
 _KINDS = {"u": 1, "f": 2}
 _REPORT = np.dtype([("status", "<u4"), ("complete", "<u4"), ("where", "<u8"), ("needed_pairs", "<u4"), ("reserved", "<u4"), ("needed_contacts", "<u8"),
                     ("needed_undecided", "<u8"), ("contacts", "<u8"), ("world_pairs", "<u8"), ("counters", "<u8", (7,))])
+_MANIFOLD_REPORT = np.dtype([("status", "<u4"), ("complete", "<u4"), ("needed_pairs", "<u4"), ("reserved", "<u4"), ("needed_contacts", "<u8"), ("needed_manifolds", "<u4"),
+                             ("needed_points", "<u4"), ("manifolds", "<u4"), ("points", "<u4"), ("counters", "<u8", (6,))])
 
 
 def _columns(dtype: np.dtype[Any]) -> dict[str, tuple[int, int, int, int]]:
@@ -49,7 +52,7 @@ def _columns(dtype: np.dtype[Any]) -> dict[str, tuple[int, int, int, int]]:
     return columns
 
 
-_FIELDS = {dtype: _columns(dtype) for dtype in (PAIR, CONTACT, MANIFOLD, POINT, CONTAINMENT, DISTANCE, IMPACT, VERDICT, _REPORT)}
+_FIELDS = {dtype: _columns(dtype) for dtype in (PAIR, CONTACT, MANIFOLD, POINT, CONTAINMENT, DISTANCE, IMPACT, VERDICT, _REPORT, _MANIFOLD_REPORT)}
 
 
 class Rows:
@@ -111,14 +114,17 @@ Verdicts = NamedTuple("Verdicts", [("pairs", Any), ("verdicts", Rows)])
 
 
 class TooLittleRoom(Error):
-    """A queued query did not fit: contacts are missing. `pairs`, `contacts` and `undecided` are the room that it needs at least: exact for what follows from what
-    did fit, so that with them it may still want more of another."""
+    """A queued query did not fit: contacts, or manifolds, are missing. `pairs`, `contacts`, `undecided`, `manifolds` and `points` are the room that it needs at
+    least: exact for what follows from what did fit, so that with them it may still want more of another."""
 
-    def __init__(self, pairs: int, contacts: int, undecided: int):
-        super().__init__(f"too little room: reserve {pairs} pairs, {contacts} contacts, {undecided} undecided", name="TooLittleRoom")
+    def __init__(self, pairs: int, contacts: int, undecided: int, manifolds: int = 0, points: int = 0):
+        of_manifolds = f", {manifolds} manifolds, {points} points" if manifolds or points else ""
+        super().__init__(f"too little room: reserve {pairs} pairs, {contacts} contacts, {undecided} undecided{of_manifolds}", name="TooLittleRoom")
         self.pairs = pairs
         self.contacts = contacts
         self.undecided = undecided
+        self.manifolds = manifolds
+        self.points = points
 
 
 def _stream(stream: Any) -> _cuda.Stream:
@@ -231,6 +237,22 @@ class Queued:
         """One row: `status`, not 0 where something is wrong; `complete`, 0 where something did not fit; `contacts`; `needed_pairs`, `needed_contacts`, ..."""
         return Rows(self._core.report(), _REPORT)
 
+    @property
+    def manifolds(self) -> Rows:
+        """Room for manifolds, rows of MANIFOLD; `manifold_report["manifolds"]` of them are there. ValueError where none was reserved."""
+        return Rows(self._core.manifolds(), MANIFOLD)
+
+    @property
+    def points(self) -> Rows:
+        """Room for their points, rows of POINT; `manifold_report["points"]` of them are there."""
+        return Rows(self._core.points(), POINT)
+
+    @property
+    def manifold_report(self) -> Rows:
+        """One row: `status`, not 0 where something is wrong; `complete`, 0 where something did not fit, and then there are no manifolds; `manifolds`, `points`;
+        `needed_manifolds`, ..."""
+        return Rows(self._core.manifold_report(), _MANIFOLD_REPORT)
+
     def wait(self, stream: Any = None) -> tuple[int, int]:
         """Waits for a stream; how many pairs and contacts there are, of what ran last.
 
@@ -239,11 +261,11 @@ class Queued:
 
         Raises:
             Error: what the GPU found wrong, with the instance or pair to blame, or with the vertex where positions of `Query.enqueue_deform` were bad.
-            TooLittleRoom: contacts are missing.
+            TooLittleRoom: contacts or manifolds are missing.
         """
-        complete, pairs, contacts, needed_pairs, needed_contacts, needed_undecided = self._core.wait(self._given, None if stream is None else _stream(stream))
+        complete, pairs, contacts, *needed = self._core.wait(self._given, None if stream is None else _stream(stream))
         if not complete:
-            raise TooLittleRoom(needed_pairs, needed_contacts, needed_undecided)
+            raise TooLittleRoom(*needed)
         return pairs, contacts
 
 
@@ -405,15 +427,23 @@ class Query:
 
     def reserve(self, *, instances: int, pairs: int, contacts: int, undecided: int | None = None, mode: Literal["exact", "fast", "boxes"] = "exact",
                 first_contact_only: bool = False, within: float = 0.0, add_error_bounds: bool = False, leave_out_rings: int = 0, sorted: bool = False,
-                grouped: bool = False) -> None:
+                grouped: bool = False, manifolds: int = 0, points: int | None = None, most_points: int = 7, match_previous: bool = True) -> None:
         """Makes room for calls of `enqueue`, and says how they look for contacts. What was queued before keeps its own room.
 
         Args:
             undecided: candidates that are not decided quickly; None: as many as contacts.
+            manifolds: where not 0, calls also make contact manifolds, as `manifolds()` does, of contacts that are grouped.
+            points: of them; None: `most_points` for each.
         """
-        self._step = _cuda.Step(self._assets, instances, pairs, contacts, contacts if undecided is None else undecided, _choice("mode", mode, _MODES),
-                                flag(first_contact_only, "first_contact_only"), amount(within, "within", FARTHEST), flag(add_error_bounds, "add_error_bounds"),
-                                whole_number(leave_out_rings, "leave_out_rings", 0, 8), flag(sorted, "sorted"), flag(grouped, "grouped"))
+        count, most = whole_number(manifolds, "manifolds", 0, _MOST), whole_number(most_points, "most_points", 1, 7)
+        if count and not grouped:
+            raise ValueError("manifolds are made of contacts that are grouped")
+        step = _cuda.Step(self._assets, instances, pairs, contacts, contacts if undecided is None else undecided, _choice("mode", mode, _MODES),
+                          flag(first_contact_only, "first_contact_only"), amount(within, "within", FARTHEST), flag(add_error_bounds, "add_error_bounds"),
+                          whole_number(leave_out_rings, "leave_out_rings", 0, 8), flag(sorted, "sorted"), flag(grouped, "grouped"))
+        if count:
+            step.reserve_manifolds(count, most * count if points is None else whole_number(points, "points", 0, _MOST), most, flag(match_previous, "match_previous"))
+        self._step = step
 
     def enqueue(self, instances: Instances | None = None, *, asset: Any = None, pose: Any = None, pairs: Any = None, filter: Filter | None = None,
                 stream: Any = None) -> Queued:

@@ -96,9 +96,9 @@ class MeshContacts:
         if is_plane.any():
             self.assets += [tandem.build(*_shapes.slab(width * 4.0**k), effort="fast") for k in range(_SLABS)]
         explicit_pairs = np.column_stack([pairs, explicit])[explicit >= 0]
-        asked, filter = asked_pairs(pairs, is_mesh)
+        asked, columns = asked_pairs(pairs, is_mesh)
         self._native = _tandem.MujocoContacts(
-            cores_of(self.assets), asset, asked, filter, threads, most_points, model, self.geoms.astype(np.uint32), radius,
+            cores_of(self.assets), asset, asked, None if columns is None else tandem.Filter(**columns)._core, threads, most_points, model, self.geoms.astype(np.uint32), radius,
             _sorted_rows(explicit_pairs), _sorted_rows(pairs[is_plane[pairs[:, 0]]]), slabs, _contact_layout())
 
     @property

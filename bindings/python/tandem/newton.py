@@ -17,17 +17,16 @@ import numpy.typing as npt
 import warp as wp  # type: ignore[import-untyped,import-not-found,unused-ignore]
 
 import tandem
-from tandem import _shapes, _tandem
-from tandem._poses import explained
-from tandem._scene import cores_of
-from tandem._solver_pairs import asked_pairs
+from tandem import _shapes
+from tandem._warp import Touch, Touches, rotation_of, write_pose
 
 __all__ = ["CollisionPipeline"]
 
-_Array = npt.NDArray[np.float64]
 _Effort = Literal["default", "fast", "best"]
 _MESH, _SHAPES = newton.GeoType.MESH, {newton.GeoType[name.upper()]: name for name in _shapes.PRIMITIVES}
-_TOUCH = np.dtype([("a", "<u4"), ("b", "<u4"), ("normal", "<f8", (3,)), ("position", "<f8", (3,)), ("gap", "<f8")])  # struct Touch of the extension
+# A CPU and a GPU are to round alike.
+wp.set_module_options({"enable_backward": False, "fuse_fp": False})
+
 _NOT_TAKEN = {"broad_phase": "which pairs there are is decided here", "shape_pairs_filtered": "which pairs there are is decided here",
               "contact_matching": "points of meshes have no match", "contact_report": "points of meshes have no match",
               "body_pair_reduction": "points of meshes are few", "speculative_contact_gap_max": "points of meshes are where surfaces are now"}
@@ -72,24 +71,37 @@ class CollisionPipeline:
         others: Any = wp.array(pairs[~is_ours].astype(np.int32), dtype=wp.vec2i, device=model.device)
         self.others = newton.CollisionPipeline(model, broad_phase="explicit", shape_pairs_filtered=others, **options)
         self.shapes = np.unique(pairs[is_ours])  #: those that Tandem looks at, ascending
-        body = values("shape_body")[self.shapes]
-        self._body, self._is_static = np.maximum(body, 0), body < 0
+        self.assets, self._asset = _assets_of(model, self.shapes, _shapes.Shapes(tolerance), effort)  #: of these shapes, at their scales
+        if len(self.shapes) == 0:
+            return
+        margin = values("shape_margin").astype(np.float64)[self.shapes]
+        world = values("shape_world")[self.shapes]
+        self._touches = Touches(self.assets, np.array(self._asset, np.uint32), np.searchsorted(self.shapes, np.sort(pairs[is_ours], axis=1)), kind[self.shapes] == _MESH,
+                                np.where(world < 0, tandem.EVERY_WORLD, world), margin, threads=threads, most_points=most_points, device=model.device)
         transform = values("shape_transform").astype(np.float64)[self.shapes]
-        self._in_body = tandem.rotations(xyzw=transform[:, 3:]), transform[:, :3]
-        self._margin = values("shape_margin").astype(np.float64)[self.shapes]
-        self.assets, asset = _assets_of(model, self.shapes, _shapes.Shapes(tolerance), effort)  #: of these shapes, at their scales
-        self.instances = np.zeros(len(self.shapes), tandem.INSTANCE)  #: the shapes, posed as in the last call
-        self.instances["asset"] = asset
+        inner = np.concatenate([tandem.rotations(xyzw=transform[:, 3:]).reshape(-1, 9), transform[:, :3]], axis=1)
+        self._body, self._shape = (wp.array(of.astype(np.int32), dtype=int, device=model.device) for of in (values("shape_body")[self.shapes], self.shapes))
+        self._inner, self._margin = (wp.array(of, dtype=wp.float64, device=model.device) for of in (inner, margin))
+        self._first = wp.zeros(1, dtype=int, device=model.device)
+
+    @property
+    def instances(self) -> npt.NDArray[np.void]:
+        """The shapes, posed as in the last call, array of tandem.INSTANCE."""
+        made = np.zeros(len(self.shapes), tandem.INSTANCE)
         if len(self.shapes):
-            asked, filter = asked_pairs(np.searchsorted(self.shapes, np.sort(pairs[is_ours], axis=1)), kind[self.shapes] == _MESH)
-            self._touches = _tandem.Touches(cores_of(self.assets), np.array(asset, np.uint32), asked, filter, self._margin, threads, most_points)
+            pose = self._touches.pose.numpy()
+            made["asset"], made["rotation"], made["translation"] = self._asset, pose[:, :9].reshape(-1, 3, 3), pose[:, 9:]
+        return made
 
     def contacts(self) -> newton.Contacts:
         """Room for the contacts of collide()."""
         return self.others.contacts()
 
-    def collide(self, state: newton.State, contacts: newton.Contacts, **options: Any) -> int:
-        """Fills `contacts` with those of `state`; returns how many of them Tandem found, which come last.
+    def collide(self, state: newton.State, contacts: newton.Contacts, **options: Any) -> int | None:
+        """Fills `contacts` with those of `state`; returns how many of them Tandem found, which come last, or None where a graph captures the call.
+
+        In a graph the room is that of the last call before it, so make one with bodies that touch as much as they will. Where something has no room there, `check`
+        says so, and `contacts` counts more than it has room for, as Newton's do, or has none of Tandem's.
 
         Args:
             options: others of newton.CollisionPipeline.collide().
@@ -101,26 +113,111 @@ class CollisionPipeline:
         self.others.collide(state, contacts, **options)
         if len(self.shapes) == 0:
             return 0
-        poses: Any = state.body_q
-        body = poses.numpy().astype(np.float64)[self._body]
-        body[self._is_static] = 0, 0, 0, 0, 0, 0, 1
-        rotation, inner = tandem.rotations(xyzw=body[:, 3:]), self._in_body
-        self.instances["rotation"] = rotation @ inner[0]
-        self.instances["translation"] = np.einsum("nij,nj->ni", rotation, inner[1]) + body[:, :3]
-        try:
-            touches = np.frombuffer(self._touches.find(self.instances), _TOUCH)
-        except tandem.Error as error:
-            raise explained(error, self.instances) from None
-        touches = touches[touches["gap"] <= self._margin[touches["a"]] + self._margin[touches["b"]]]
-        sides = []
-        for name, sign in (("a", 1.0), ("b", -1.0)):
-            i, out = touches[name], sign * touches["normal"]
-            place = touches["position"] - 0.5 * touches["gap"][:, None] * out - body[i, :3]  # on the surface
-            margin = self._margin[i]
-            point, offset = (np.einsum("nji,nj->ni", rotation[i], vector) for vector in (place, margin[:, None] * out))
-            sides.append((self.shapes[i], point, offset, margin))
-        _append(contacts, sides, touches["normal"])
-        return len(touches)
+        touches, device = self._touches, self.model.device
+        wp.launch(_write_poses, dim=len(self.shapes), inputs=[state.body_q, self._body, self._inner], outputs=[touches.pose], device=device)
+        found = touches.find()
+        if found is not None:
+            before: Any = contacts.rigid_contact_count
+            if found == 0:
+                return 0
+            if (end := int(before.numpy()[0]) + found) > contacts.rigid_contact_max:
+                raise MemoryError(f"{end} contacts have no room: rigid_contact_max is {contacts.rigid_contact_max}")
+        self._append(state, contacts, len(touches.touches) if found is None else found)
+        return found
+
+    def check(self) -> None:
+        """Waits for a graph that captured collide(). Raises what was wrong in its last replay: tandem.Error, or tandem.cuda.TooLittleRoom."""
+        if len(self.shapes):
+            self._touches.check()
+
+    @property
+    def is_on_gpu(self) -> bool:
+        """Says whether Tandem's contacts are found on the GPU, and nothing is copied to the CPU."""
+        return len(self.shapes) > 0 and self._touches.is_on_gpu
+
+    def _append(self, state: newton.State, contacts: newton.Contacts, most: int) -> None:
+        touches, device = self._touches, self.model.device
+        wp.launch(_take_room, dim=1, inputs=[touches.count], outputs=[contacts.rigid_contact_count, self._first], device=device)
+        columns = [getattr(contacts, f"rigid_contact_{name}{side}") for name in ("shape", "point", "offset", "margin") for side in (0, 1)]
+        wp.launch(_write_contacts, dim=most, device=device,
+                  inputs=[touches.count, self._first, touches.touches, state.body_q, self._body, self._shape, self._margin, contacts.rigid_contact_max],
+                  outputs=[*columns, contacts.rigid_contact_normal, contacts.rigid_contact_tids])
+        for name in ("stiffness", "damping", "friction"):
+            array = getattr(contacts, f"rigid_contact_{name}")
+            if array is not None:  # the shapes' own
+                wp.launch(_write_zeros, dim=most, inputs=[touches.count, self._first, contacts.rigid_contact_max], outputs=[array], device=device)
+
+
+@wp.kernel
+def _write_poses(body_q: wp.array[wp.transform], body: wp.array[int], inner: wp.array2d[wp.float64], pose: wp.array2d[wp.float64]):
+    """Writes the poses of shapes: of the body, -1 for none, and of the shape in it."""
+    i = wp.tid()
+    of_shape = inner[i]
+    rotation = wp.mat33d(of_shape[0], of_shape[1], of_shape[2], of_shape[3], of_shape[4], of_shape[5], of_shape[6], of_shape[7], of_shape[8])
+    translation = wp.vec3d(of_shape[9], of_shape[10], of_shape[11])
+    if body[i] >= 0:
+        of_body = body_q[body[i]]
+        turn = rotation_of(wp.transform_get_rotation(of_body))
+        place = wp.transform_get_translation(of_body)
+        rotation = turn * rotation
+        translation = turn * translation + wp.vec3d(wp.float64(place[0]), wp.float64(place[1]), wp.float64(place[2]))
+    write_pose(pose[i], rotation, translation)
+
+
+@wp.kernel
+def _take_room(count: wp.array[int], of_contacts: wp.array[int], first: wp.array[int]):
+    """Puts the number of contacts that there are into `first`, and adds those that follow."""
+    first[0] = of_contacts[0]
+    of_contacts[0] = of_contacts[0] + count[0]
+
+
+@wp.func
+def _single(v: wp.vec3d):
+    return wp.vec3(wp.float32(v[0]), wp.float32(v[1]), wp.float32(v[2]))
+
+
+@wp.func
+def _write_side(row: int, shape: int, body: int, body_q: wp.array[wp.transform], surface: wp.vec3d, out: wp.vec3d, margin: wp.float64, shapes: wp.array[int],
+                points: wp.array[wp.vec3], offsets: wp.array[wp.vec3], margins: wp.array[float]):
+    """Writes one side of a contact: surface: its place in the world, out: the normal away from the body."""
+    point = surface
+    offset = margin * out
+    if body >= 0:
+        of_body = body_q[body]
+        back = wp.transpose(rotation_of(wp.transform_get_rotation(of_body)))
+        place = wp.transform_get_translation(of_body)
+        point = back * (surface - wp.vec3d(wp.float64(place[0]), wp.float64(place[1]), wp.float64(place[2])))
+        offset = back * offset
+    shapes[row] = shape
+    points[row] = _single(point)
+    offsets[row] = _single(offset)
+    margins[row] = wp.float32(margin)
+
+
+@wp.kernel
+def _write_contacts(count: wp.array[int], first: wp.array[int], touches: wp.array[Touch], body_q: wp.array[wp.transform], body: wp.array[int], shape: wp.array[int],
+                    margin: wp.array[wp.float64], most: int, shape0: wp.array[int], shape1: wp.array[int], point0: wp.array[wp.vec3], point1: wp.array[wp.vec3],
+                    offset0: wp.array[wp.vec3], offset1: wp.array[wp.vec3], margin0: wp.array[float], margin1: wp.array[float], normal: wp.array[wp.vec3],
+                    tids: wp.array[int]):
+    k = wp.tid()
+    row = first[0] + k
+    if k >= count[0] or row >= most:
+        return
+    touch = touches[k]
+    a = int(touch.a)
+    b = int(touch.b)
+    half = wp.float64(0.5) * touch.gap * touch.normal
+    _write_side(row, shape[a], body[a], body_q, touch.position - half, touch.normal, margin[a], shape0, point0, offset0, margin0)
+    _write_side(row, shape[b], body[b], body_q, touch.position + half, -touch.normal, margin[b], shape1, point1, offset1, margin1)
+    normal[row] = _single(touch.normal)
+    tids[row] = 0
+
+
+@wp.kernel
+def _write_zeros(count: wp.array[int], first: wp.array[int], most: int, values: wp.array[float]):
+    k = wp.tid()
+    if k < count[0] and first[0] + k < most:
+        values[first[0] + k] = 0.0
 
 
 def _assets_of(model: newton.Model, shapes: npt.NDArray[np.intp], solids: _shapes.Shapes, effort: _Effort) -> tuple[list[tandem.Asset], list[int]]:
@@ -141,28 +238,3 @@ def _assets_of(model: newton.Model, shapes: npt.NDArray[np.intp], solids: _shape
             assets.append(tandem.build(vertices, faces, effort=effort))
         asset.append(places[key])
     return assets, asset
-
-
-def _append(contacts: newton.Contacts, sides: list[Any], normal: _Array) -> None:
-    count = int(contacts.rigid_contact_count.numpy()[0])
-    end = count + len(normal)
-    if len(normal) == 0:
-        return
-    if end > contacts.rigid_contact_max:
-        raise MemoryError(f"{end} contacts have no room: rigid_contact_max is {contacts.rigid_contact_max}")
-
-    def put(name: str, values: npt.NDArray[Any]) -> None:
-        array = getattr(contacts, f"rigid_contact_{name}")
-        if array is not None:
-            array[count:end].assign(np.ascontiguousarray(values, np.int32 if values.dtype.kind == "i" else np.float32))
-
-    for side, (shape, point, offset, margin) in enumerate(sides):
-        put(f"shape{side}", shape)
-        put(f"point{side}", point)
-        put(f"offset{side}", offset)
-        put(f"margin{side}", margin)
-    put("normal", normal)
-    for name in ("stiffness", "damping", "friction"):
-        put(name, np.zeros(len(normal)))  # the shapes' own
-    put("tids", np.zeros(len(normal), int))
-    contacts.rigid_contact_count.assign(np.array([end], np.int32))

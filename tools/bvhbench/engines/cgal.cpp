@@ -141,6 +141,7 @@ class CgalContacts final : public EngineWith<LevelView> {
   }
 
   void collide(std::uint32_t pair, std::uint32_t a, std::uint32_t b) override {
+    if (!CGAL::do_overlap(boxes_[a], boxes_[b])) return;
     Reaching of_a(shape(a), poses_[a], boxes_[b]);
     Reaching of_b(shape(b), poses_[b], boxes_[a]);
     const auto decide = [&](const TriangleBox& box_a, const TriangleBox& box_b) {

@@ -206,12 +206,16 @@ void add_gpu_queries(nb::module_& module) {
   nb::class_<Step>(module, "Step")
       .def(nb::init<nb::object, std::uint32_t, std::uint32_t, std::uint64_t, std::uint64_t, std::uint32_t,
                     bool, double, bool, std::uint32_t, bool, bool>())
+      .def("reserve_manifolds", &Step::reserve_manifolds)
       .def("enqueue", &Step::enqueue, nb::arg(), nb::arg().none(), nb::arg().none(), nb::arg())
       .def("pairs", &Step::pairs)
       .def("pair_count", &Step::pair_count)
       .def("contacts", &Step::contacts)
       .def("report", &Step::report)
       .def("first_contact", &Step::first_contact)
+      .def("manifolds", &Step::manifolds)
+      .def("points", &Step::points)
+      .def("manifold_report", &Step::manifold_report)
       .def("wait", &Step::wait, nb::arg().none(), nb::arg().none());
 }
 

@@ -143,18 +143,31 @@ class Query {
   std::optional<Last> last_;
 };
 
+/// The room for manifolds of a step, and how they are made.
+struct ManifoldRoom {
+  std::uint32_t manifolds = 0, points = 0;  ///< 0 manifolds: the step makes none
+  std::uint32_t most_points = 0;
+  bool match_previous = false;
+};
+
 /// A step with room for a given scene, which is queued and never waits.
 class Step {
  public:
   Step(nb::object assets, std::uint32_t instances, std::uint32_t pairs, std::uint64_t contacts,
        std::uint64_t undecided, std::uint32_t mode, bool first_contact_only, double within,
        bool add_error_bounds, std::uint32_t leave_out_rings, bool sorted, bool grouped);
+  /// Lets calls make manifolds too. Condition: contacts are grouped, and nothing is queued.
+  void reserve_manifolds(std::uint32_t manifolds, std::uint32_t points, std::uint32_t most_points,
+                         bool match_previous);
   void enqueue(nb::object instances, nb::object pairs, nb::object filter, const Stream& stream);
   Rows pairs() const;
   Array pair_count() const;
   Rows contacts() const;
   Rows report() const;
   Array first_contact() const;
+  Rows manifolds() const;
+  Rows points() const;
+  Rows manifold_report() const;
   /// given: the pairs of the call that is waited for, or None. stream: null: that of the last call, or, where
   /// a call was captured, all of the device's, since its graph may run on any.
   nb::tuple wait(nb::handle given, const Stream* stream);
@@ -163,14 +176,18 @@ class Step {
   Memory memory_of(std::shared_ptr<const void> owner) const {
     return {std::move(owner), assets_.device(), stream_, false};
   }
+  void require_manifolds() const;
 
   nb::object assets_object_;
   const Assets& assets_;
   BroadPhases::Pointer broad_phase_;
   ContactQueries::Pointer contacts_;
+  ManifoldMakers::Pointer manifolds_;  // null: none are made
   tandem_gpu_query_options options_;
   tandem_gpu_broad_phase_options near_;
+  std::uint32_t pair_room_;
   std::uint64_t contact_room_;
+  ManifoldRoom manifold_room_;
   std::atomic<bool> busy_ = false;
   Stream stream_;
   bool captured_ = false;

@@ -9,6 +9,7 @@ Step::Step(nb::object assets, std::uint32_t instances, std::uint32_t pairs, std:
       assets_(nb::cast<const Assets&>(assets)),
       options_(sized<tandem_gpu_query_options>()),
       near_(sized<tandem_gpu_broad_phase_options>()),
+      pair_room_(pairs),
       contact_room_(contacts) {
   options_.mode = mode;
   options_.first_contact_only = first_contact_only;
@@ -25,6 +26,16 @@ Step::Step(nb::object assets, std::uint32_t instances, std::uint32_t pairs, std:
   const tandem_gpu_query_capacity room = {pairs, 0, contacts, undecided};
   check_whole(tandem_gpu_broad_phase_reserve(broad_phase_.get(), &near_room, &near_));
   check_whole(tandem_gpu_contact_query_reserve(contacts_.get(), &room, &options_));
+}
+
+void Step::reserve_manifolds(std::uint32_t manifolds, std::uint32_t points, std::uint32_t most_points,
+                             bool match_previous) {
+  const OnDevice current(assets_.device());
+  const auto made = ManifoldMakers::make(assets_, Stream());
+  const tandem_gpu_manifold_capacity room = {pair_room_, 0, contact_room_, manifolds, points};
+  check_whole(tandem_gpu_manifolds_reserve(made.get(), &room));
+  manifold_room_ = {manifolds, points, most_points, match_previous};
+  manifolds_ = made;
 }
 
 void Step::enqueue(nb::object instances, nb::object pairs, nb::object filter, const Stream& stream) {
@@ -44,6 +55,13 @@ void Step::enqueue(nb::object instances, nb::object pairs, nb::object filter, co
     of = nb::cast<const Pairs&>(pairs).get();
   }
   check_whole(tandem_gpu_contact_query_enqueue(contacts_.get(), &bodies.get(), &of, &options_, stream_));
+  if (manifolds_ != nullptr) {
+    auto options = sized<tandem_manifold_options>();
+    options.most_points = manifold_room_.most_points;
+    options.ignore_previous = !manifold_room_.match_previous;
+    check_whole(tandem_gpu_manifolds_enqueue(manifolds_.get(), &bodies.get(), &of, contacts_.get(), &options,
+                                             stream_));
+  }
   instances_ = instances;
   given_ = pairs;
   filter_ = filter;
@@ -76,6 +94,28 @@ Array Step::first_contact() const {
   return {memory_of(contacts_), groups.first_contact, kU32, {pairs + 1}, {1}};
 }
 
+void Step::require_manifolds() const {
+  if (manifolds_ == nullptr) throw nb::value_error("no room for manifolds was reserved");
+}
+
+Rows Step::manifolds() const {
+  require_manifolds();
+  return {memory_of(manifolds_), tandem_gpu_manifolds_manifolds(manifolds_.get()), manifold_room_.manifolds,
+          sizeof(tandem_manifold)};
+}
+
+Rows Step::points() const {
+  require_manifolds();
+  return {memory_of(manifolds_), tandem_gpu_manifolds_points(manifolds_.get()), manifold_room_.points,
+          sizeof(tandem_manifold_point)};
+}
+
+Rows Step::manifold_report() const {
+  require_manifolds();
+  return {memory_of(manifolds_), tandem_gpu_manifolds_device_report(manifolds_.get()), 1,
+          sizeof(tandem_gpu_manifold_report)};
+}
+
 nb::tuple Step::wait(nb::handle given, const Stream* stream) {
   const Turn turn(busy_, kBusy);
   const OnDevice current(assets_.device());
@@ -97,8 +137,13 @@ nb::tuple Step::wait(nb::handle given, const Stream* stream) {
   }
   tandem_gpu_query_report report;
   check(tandem_gpu_contact_query_get_report(contacts_.get(), &report), report.where);
-  return nb::make_tuple(report.complete != 0, pairs, report.contacts, report.needed.pairs,
-                        report.needed.contacts, report.needed.undecided);
+  tandem_gpu_manifold_report made = {};
+  made.complete = 1;
+  if (manifolds_ != nullptr && report.complete != 0)
+    check_whole(tandem_gpu_manifolds_get_report(manifolds_.get(), &made));
+  const bool complete = report.complete != 0 && made.complete != 0;
+  return nb::make_tuple(complete, pairs, report.contacts, report.needed.pairs, report.needed.contacts,
+                        report.needed.undecided, made.needed.manifolds, made.needed.points);
 }
 
 }  // namespace tandem::python

@@ -12,10 +12,7 @@
 namespace tandem {
 namespace {
 
-struct FoundHit {
-  ray::Meeting meeting;
-  std::uint32_t body, triangle;
-};
+using ray::FoundHit;
 
 // The search for the hits of one ray.
 struct RaySearch {
@@ -37,16 +34,13 @@ struct RaySearch {
     pose_corners(tree.pose, tree.tree, hit.triangle, out);
   }
 
-  // Whether a hit comes before another one. corner: of x.
   bool comes_before(const FoundHit& x, const FoundHit& y) const {
-    if (x.meeting.t.upper < y.meeting.t.lower) return true;
-    if (y.meeting.t.upper < x.meeting.t.lower) return false;
+    const ray::Answer answer = ray::comes_before_by_float64(x, y);
+    if (answer != ray::Answer::unsure) return answer == ray::Answer::yes;
     double of_x[3][3], of_y[3][3];
     corners_of(x, of_x);
     corners_of(y, of_y);
-    const int order = ray::compare_exactly(ray.origin, ray.direction, of_x, of_y);
-    if (order != 0) return order < 0;
-    return x.body != y.body ? x.body < y.body : x.triangle < y.triangle;
+    return ray::comes_before_exactly(ray.origin, ray.direction, x, of_x, y, of_y);
   }
 
   // Looks at a triangle. False: the search is over.
@@ -76,24 +70,14 @@ float take_triangle(void* context, std::uint32_t triangle) {
   return local_limit(search.ray, *search.local, search.last);
 }
 
-// A walk by world boxes in float64, of a body that float32 cannot take.
+// A walk of a body that float32 cannot take.
 void walk_world_boxes(const PosedTree& tree, RaySearch& search) {
-  std::uint32_t stack[3 * kMaxDepth + 4], height = 0;
-  stack[height++] = 0;
-  while (height > 0) {
-    const Block& block = tree.tree.blocks[stack[--height]];
-    ++search.blocks;
-    for (int i = 0; i < kNodesPerBlock; ++i) {
-      if (block.kind[i] == NodeKind::imaginary) continue;
-      const WorldBox box = node_world_box(tree.pose, block, i);
-      double first = 0, last = search.last / search.ray.factor;
-      if (!meets_box(search.ray.origin, search.ray.scaled, box.lo, box.hi, first, last)) continue;
-      if (!block.is_leaf_block())
-        stack[height++] = block.index[i];
-      else if (!search.take(block.index[i]))
-        return;
-    }
-  }
+  const auto wanted = [&](const WorldBox& box) {
+    double first = 0, last = search.last / search.ray.factor;
+    return meets_box(search.ray.origin, search.ray.scaled, box.lo, box.hi, first, last);
+  };
+  search.blocks += probe::walk_world_boxes(tree.pose, tree.tree.blocks, wanted,
+                                           [&](std::uint32_t triangle) { return search.take(triangle); });
 }
 
 bool is_known(RayHits hits) {

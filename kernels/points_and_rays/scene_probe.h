@@ -7,6 +7,7 @@
 
 #include "kernels/common/block_pair.h"
 #include "kernels/geometry/local_frame.h"
+#include "kernels/points_and_rays/body_tree.h"
 #include "kernels/scene/scene_state.h"
 
 // What questions about points and rays share: the bodies in their frames, a tree of their world boxes, and an
@@ -18,9 +19,7 @@ namespace tandem {
 inline constexpr std::size_t kProbesAtOnce = 512;
 
 inline bool is_in_range(const std::array<double, 3>& point) {
-  bool in_range = true;
-  for (double x : point) in_range = in_range && std::fabs(x) <= kLargestWorldCoordinate;
-  return in_range;
+  return probe::is_in_range(point.data());
 }
 
 /// The bodies of a scene as points and rays see them, kept until one changes.
@@ -34,45 +33,20 @@ class ProbedBodies {
   /// The box of all bodies; empty where there are none.
   const WorldBox& bounds() const { return bounds_; }
 
-  /// Visits bodies in about the order of a bound: bound(world box) -> double is not above what it is for
-  /// anything in the box, and infinity where nothing there counts. Those with a bound of more than `limit`
-  /// are passed over; visit(body) may make that less.
+  /// As visit_bodies() does.
   template <typename Bound, typename Visit>
   void visit(const Bound& bound, const double& limit, const Visit& visit) const {
-    const BoxTree& tree = boxes_.tree();
-    if (tree.items.size() == 0) return;
-    struct Entry {
-      double bound;
-      std::size_t number;
-      int level;  // of the group; -1: a body
-    } stack[3 * std::size(BoxTree{}.level_begin) + BoxTree::kGroup + 1];
-    std::size_t height = 0;
-    stack[height++] = {-HUGE_VAL, 0, tree.top()};
-    while (height > 0) {
-      const Entry entry = stack[--height];
-      if (!(entry.bound <= limit)) continue;
-      if (entry.level < 0) {
-        visit(static_cast<std::uint32_t>(entry.number));
-        continue;
-      }
-      const BoxTree::Group& group = tree.level(entry.level)[entry.number];
-      const std::size_t bottom = height;
-      for (std::size_t i = 0; i < BoxTree::kGroup; ++i) {
-        WorldBox box;
-        for (int k = 0; k < 3; ++k) box.lo[k] = group.lo[k][i], box.hi[k] = group.hi[k][i];
-        if (!(box.lo[0] <= box.hi[0])) continue;
-        const double least = bound(box);
-        if (!(least <= limit) || least == HUGE_VAL) continue;
-        const std::size_t below = BoxTree::kGroup * entry.number + i;
-        const Entry next = {least, entry.level == 0 ? tree.items[below].box : below, entry.level - 1};
-        std::size_t at = height++;
-        for (; at > bottom && stack[at - 1].bound < least; --at) stack[at] = stack[at - 1];
-        stack[at] = next;
-      }
-    }
+    if (boxes_.tree().items.size() != 0) probe::visit_bodies(Places{boxes_.tree()}, bound, limit, visit);
   }
 
  private:
+  struct Places {
+    const BoxTree& tree;
+    int top() const { return tree.top(); }
+    const BoxTree::Group* level(int i) const { return tree.level(i); }
+    std::uint32_t body(std::uint32_t i) const { return tree.items[i].box; }
+  };
+
   std::uint64_t assets_id_ = 0, shapes_id_ = 0, version_ = 0;  // of what this is made
   Buffer<LocalFrame> frames_;
   WorldBox bounds_;

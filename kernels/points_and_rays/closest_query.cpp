@@ -26,7 +26,7 @@ struct SceneSearch : ClosestSearch {
     pose_corners(tree.pose, tree.tree, triangle, out);
   }
   bool distance(const TrianglePair& pair, const DistanceTolerance& wanted, TriangleDistance& out) const {
-    out = point_distance(pair, wanted);
+    if (!point_distance_by_float64(pair, wanted, out)) out = triangle_distance(pair, wanted);
     return true;
   }
 };
@@ -90,7 +90,6 @@ struct ClosestQuery::State : Allocated {
 };
 
 Status ClosestQuery::State::label(SceneState& scene) {
-  if (const Status status = scene.require_topology(); status != Status::kOk) return status;
   if (labels_of == scene.assets_id) return Status::kOk;
   labels_of = 0;
   surfaces.clear();
@@ -253,8 +252,10 @@ Status ClosestQuery::answer(SceneState& scene, const ClosestOptions& options) {
 
 Status ClosestQuery::find(Scene& in, const ClosestOptions& options) {
   return ask_scene(in, [&](SceneState& scene) {
-    const Status status = check(scene, options);
-    return status == Status::kOk ? answer(scene, options) : status;
+    Status status = check(scene, options);
+    if (status == Status::kOk && options.sides) status = scene.require_topology();
+    if (status != Status::kOk) return status;
+    return scene.device != nullptr ? scene.ask_device(options, found()) : answer(scene, options);
   });
 }
 

@@ -1,14 +1,14 @@
 #pragma once
 #include "kernels/contact/candidate.h"
-#include "kernels/geometry/triangle_distance.h"
+#include "kernels/geometry/point_distance.h"
 #include "kernels/points_and_rays/probe_walk.h"
 #include "tandem/kernels/closest_query.h"
 
 namespace tandem {
 
 /// The search for the closest point of one point, for CPU and GPU. Source: corners(body, triangle, out) poses
-/// a triangle, and distance(pair, tolerance, out) is point_distance(), or false where it leaves the answer to
-/// somebody else: then the search means nothing.
+/// a triangle, and distance(pair, tolerance, out) finds the distance of a point, or is false where it leaves
+/// that to somebody else: then the search means nothing.
 struct ClosestSearch {
   DistanceTolerance tolerance;
   double point[3];

@@ -7,6 +7,7 @@
 #include "kernels/common/lane_variant.h"
 #include "kernels/contact/candidate.h"
 #include "kernels/points_and_rays/probe_ways.h"
+#include "kernels/points_and_rays/ray_rows.h"
 #include "kernels/points_and_rays/scene_probe.h"
 
 namespace tandem {
@@ -146,15 +147,7 @@ void RayQuery::State::find(SceneState& scene, const RayOptions& options, std::ui
 namespace {
 
 RayHit row_of(const SceneState& scene, std::uint32_t ray, const FoundHit& hit) {
-  RayHit row;
-  row.t = hit.meeting.t.lower + (hit.meeting.t.upper - hit.meeting.t.lower) / 2;
-  row.weight[0] = hit.meeting.weight[0];
-  row.weight[1] = hit.meeting.weight[1];
-  row.ray = ray;
-  row.body = hit.body;
-  row.triangle = hit.triangle;
-  row.face = scene.bodies[hit.body].tree.triangles[hit.triangle].source_face();
-  return row;
+  return tandem::row_of(ray, hit, scene.bodies[hit.body].tree.triangles[hit.triangle].source_face());
 }
 
 Status check(SceneState& scene, const RayOptions& options) {
@@ -208,8 +201,7 @@ Status RayQuery::answer(SceneState& scene, const RayOptions& options) {
       if (!all) fetch_ahead(&rows_[soon]);
       state.find(scene, options, ray, search);
       if (!all) {
-        rows_[ray] = search.found ? row_of(scene, ray, search.best)
-                                  : RayHit{HUGE_VAL, {0, 0}, ray, kNoIndex, kNoIndex, kNoIndex};
+        rows_[ray] = search.found ? row_of(scene, ray, search.best) : row_without_hit(ray);
         continue;
       }
       std::sort(search.all.data(), search.all.data() + search.all.size(),
@@ -248,7 +240,8 @@ Status RayQuery::answer(SceneState& scene, const RayOptions& options) {
 Status RayQuery::find(Scene& in, const RayOptions& options) {
   return ask_scene(in, [&](SceneState& scene) {
     const Status status = check(scene, options);
-    return status == Status::kOk ? answer(scene, options) : status;
+    if (status != Status::kOk) return status;
+    return scene.device != nullptr ? scene.ask_device(options, found()) : answer(scene, options);
   });
 }
 

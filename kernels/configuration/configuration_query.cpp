@@ -260,7 +260,7 @@ void ConfigurationQuery::State::find_nearest(const SceneState& scene, const Conf
   for (const Candidate& candidate : worker.candidates.view()) look_at(candidate);
   for (std::uint32_t i = 0; i < bodies.size() && standing.kept_of() != 0; ++i) {
     const auto gap = [&](const WorldBox& box) { return distance_between(worker.boxes[i], box); };
-    visit_nearest(standing.kept(), gap, limit, [&](std::uint32_t other) {
+    visit_bodies(standing.kept(), gap, limit, [&](std::uint32_t other) {
       const Candidate candidate = standing_one(i, other);
       if (candidate.bodies != former && filter.looks_at(bodies[i], other)) look_at(candidate);
     });

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
-#include "kernels/common/component_labels.h"
 #include "kernels/common/gpu_host.h"
+#include "kernels/common/surface_labels.h"
 #include "kernels/containment/containment_data.h"
 #include "kernels/containment/follow_records.h"
 #include "tandem/kernels/detail/buffer.h"
@@ -35,28 +35,15 @@ struct HostOf<GpuContainmentReport> : GpuHost<ContainmentState, GpuContainmentRe
 
   // labels_of_it: in CPU memory, to be filled where there is more than one component.
   Status make_surface(const GpuAsset& asset, std::uint32_t* labels_of_it, cudaStream_t stream, Surface& out) {
-    LevelView level = asset.tree;
+    const LevelView& level = asset.tree;
     out = {};
     take_shape(asset, out);
     out.components = level.components;
     out.triangle_count = level.triangle_count;
     out.component_count = level.component_count;
     out.closed = out.any_closed = level.closed;
-    if (level.component_count == 1) return Status::kOk;
-    Buffer<TriangleTopology> topology;
-    Buffer<SurfaceComponent> components;
-    if (!topology.resize(level.triangle_count) || !components.resize(level.component_count))
-      return Status::kOutOfMemory;
-    Status status =
-        keep(download<TriangleTopology>(level.topology, {topology.data(), topology.size()}, stream));
-    if (status == Status::kOk)
-      status =
-          keep(download<SurfaceComponent>(level.components, {components.data(), components.size()}, stream));
-    if (status != Status::kOk) return status;
-    level.topology = topology.data(), level.components = components.data();
-    for (const SurfaceComponent& component : components.view())
-      out.any_closed = out.any_closed || is_closed(component);
-    return containment::label_triangles(level, labels_of_it) ? Status::kOk : Status::kOutOfMemory;
+    return level.component_count == 1 ? Status::kOk
+                                      : label_surface(asset, labels_of_it, out.any_closed, *this, stream);
   }
 
   Status set_assets(std::span<const GpuAsset> assets, cudaStream_t stream) {

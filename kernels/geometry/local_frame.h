@@ -1,10 +1,10 @@
 #pragma once
-#include <bit>
 #include <cmath>
 #include <cstdint>
 
 #include "kernels/geometry/box_distance.h"
 #include "kernels/geometry/ray_triangle.h"
+#include "kernels/geometry/wide_integer.h"
 #include "kernels/geometry/relative_pose.h"
 #include "tandem/kernels/world_box.h"
 
@@ -154,8 +154,8 @@ struct WorldRay {
 
 /// The power of two that takes a positive float64 number to [1, 2), or subnormal ones to less.
 TANDEM_HD inline double scale_to_one(double x) {
-  const auto exponent = static_cast<int>(std::bit_cast<std::uint64_t>(x) >> 52);
-  return std::bit_cast<double>(static_cast<std::uint64_t>(2046 - (exponent > 1 ? exponent : 1)) << 52);
+  const auto exponent = static_cast<int>(detail::bits_of(x) >> 52);
+  return detail::float64_of(static_cast<std::uint64_t>(2046 - (exponent > 1 ? exponent : 1)) << 52);
 }
 
 TANDEM_HD inline WorldRay world_ray(const double* origin, const double* direction, double reach) {

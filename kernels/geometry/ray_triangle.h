@@ -96,42 +96,61 @@ TANDEM_HD inline int exact_side(const double (&origin)[3], const double (&direct
                                                   {corner[i], corner[(i + 1) % 3]});
 }
 
-/// The first parameter and the weights in whole numbers. False: the ray does not meet the triangle.
-TANDEM_OUT_OF_LINE TANDEM_HD inline bool find_exactly(const double (&origin)[3], const double (&direction)[3],
-                                                      const double (&corner)[3][3], Meeting& out) {
-  constexpr int kFew = 8;
-  exact::RayUnits units;
-  units.include(origin, direction);
-  units.include(corner);
-  return units.words() <= kFew
-             ? exact::find_meeting<kFew>(origin, direction, corner, units, out.t, out.weight)
-             : exact::find_meeting<detail::kMaxWords>(origin, direction, corner, units, out.t, out.weight);
-}
+/// The words of a coordinate with which exact arithmetic is quick. Functions that take kWords decide what
+/// needs no more than these (words_of()); the most decide everything.
+inline constexpr int kFewWords = 8;
 
-/// The sign of the difference of the parameters at which a ray meets two triangles, both of which it meets.
-TANDEM_OUT_OF_LINE TANDEM_HD inline int compare_exactly(const double (&origin)[3],
-                                                        const double (&direction)[3], const double (&a)[3][3],
-                                                        const double (&b)[3][3]) {
-  constexpr int kFew = 8;
+TANDEM_HD inline int words_of(const double (&origin)[3], const double (&direction)[3],
+                              const double (&a)[3][3], const double (&b)[3][3]) {
   exact::RayUnits units;
   units.include(origin, direction);
   units.include(a);
   units.include(b);
-  return units.words() <= kFew ? exact::compare_meetings<kFew>(origin, direction, a, b, units)
-                               : exact::compare_meetings<detail::kMaxWords>(origin, direction, a, b, units);
+  return units.words();
 }
 
-/// Returns whether a ray meets a triangle, which it does, at a parameter of at most `last`, which is finite.
-TANDEM_OUT_OF_LINE TANDEM_HD inline bool is_within_exactly(const double (&origin)[3],
-                                                           const double (&direction)[3],
-                                                           const double (&corner)[3][3], double last) {
-  constexpr int kFew = 8;
+/// The first parameter and the weights in whole numbers. False: the ray does not meet the triangle.
+template <int kWords>
+TANDEM_OUT_OF_LINE TANDEM_HD inline bool find_exactly(const double (&origin)[3], const double (&direction)[3],
+                                                      const double (&corner)[3][3], Meeting& out) {
   exact::RayUnits units;
   units.include(origin, direction);
   units.include(corner);
-  return (units.words() <= kFew
-              ? exact::compare_with<kFew>(origin, direction, corner, units, last)
-              : exact::compare_with<detail::kMaxWords>(origin, direction, corner, units, last)) <= 0;
+  if constexpr (kWords > kFewWords) {
+    if (units.words() > kFewWords)
+      return exact::find_meeting<kWords>(origin, direction, corner, units, out.t, out.weight);
+  }
+  return exact::find_meeting<kFewWords>(origin, direction, corner, units, out.t, out.weight);
+}
+
+/// The sign of the difference of the parameters at which a ray meets two triangles, both of which it meets.
+template <int kWords = detail::kMaxWords>
+TANDEM_OUT_OF_LINE TANDEM_HD inline int compare_exactly(const double (&origin)[3],
+                                                        const double (&direction)[3], const double (&a)[3][3],
+                                                        const double (&b)[3][3]) {
+  exact::RayUnits units;
+  units.include(origin, direction);
+  units.include(a);
+  units.include(b);
+  if constexpr (kWords > kFewWords) {
+    if (units.words() > kFewWords) return exact::compare_meetings<kWords>(origin, direction, a, b, units);
+  }
+  return exact::compare_meetings<kFewWords>(origin, direction, a, b, units);
+}
+
+/// Returns whether a ray meets a triangle, which it does, at a parameter of at most `last`, which is finite.
+template <int kWords>
+TANDEM_OUT_OF_LINE TANDEM_HD inline bool is_within_exactly(const double (&origin)[3],
+                                                           const double (&direction)[3],
+                                                           const double (&corner)[3][3], double last) {
+  exact::RayUnits units;
+  units.include(origin, direction);
+  units.include(corner);
+  if constexpr (kWords > kFewWords) {
+    if (units.words() > kFewWords)
+      return exact::compare_with<kWords>(origin, direction, corner, units, last) <= 0;
+  }
+  return exact::compare_with<kFewWords>(origin, direction, corner, units, last) <= 0;
 }
 
 /// What float64 tells of a meeting. False: it is not sure enough.
@@ -149,36 +168,82 @@ TANDEM_HD inline bool find_surely(const Volumes& v, Meeting& out) {
   return true;
 }
 
+/// Says what one stage knows.
+enum class Answer : std::uint8_t { no, yes, unsure };
+
+/// Whether a ray meets a triangle, and where first, as far as float64 is sure. v: as of volumes_of().
+TANDEM_HD inline Answer find_by_float64(const Volumes& v, Meeting& out) {
+  int most = 0, least = 0, unsure = 0;
+  for (int i = 0; i < 3; ++i) {
+    const int sign = detail::certain_sign(v.side[i], v.side_error);
+    most = sign > most ? sign : most;
+    least = sign < least ? sign : least;
+    unsure += sign == 0;
+  }
+  if (most > 0 && least < 0) return Answer::no;
+  if (unsure > 0) return Answer::unsure;
+  const int height = detail::certain_sign(v.height, v.height_error) * (most + least);
+  if (height < 0) return Answer::no;
+  return height > 0 && find_surely(v, out) ? Answer::yes : Answer::unsure;
+}
+
 /// Returns whether a ray meets a triangle, and where first. Finite coordinates; the direction is not 0.
+template <int kWords = detail::kMaxWords>
 TANDEM_HD inline bool find_meeting(const double (&origin)[3], const double (&direction)[3],
                                    const double (&corner)[3][3], Meeting& out) {
   const Volumes v = volumes_of(origin, direction, corner);
-  int sign[3], most = 0, least = 0;
+  if (const Answer answer = find_by_float64(v, out); answer != Answer::unsure) return answer == Answer::yes;
+  int most = 0, least = 0;
   for (int i = 0; i < 3; ++i) {
-    sign[i] = detail::certain_sign(v.side[i], v.side_error);
-    most = sign[i] > most ? sign[i] : most;
-    least = sign[i] < least ? sign[i] : least;
-  }
-  if (most > 0 && least < 0) return false;
-  for (int i = 0; i < 3; ++i) {
-    if (sign[i] != 0) continue;
-    sign[i] = exact_side(origin, direction, corner, i);
-    most = sign[i] > most ? sign[i] : most;
-    least = sign[i] < least ? sign[i] : least;
+    int sign = detail::certain_sign(v.side[i], v.side_error);
+    if (sign == 0) sign = exact_side(origin, direction, corner, i);
+    most = sign > most ? sign : most;
+    least = sign < least ? sign : least;
     if (most > 0 && least < 0) return false;
   }
   const int across = most + least;
-  if (across == 0) return find_exactly(origin, direction, corner, out);
+  if (across == 0) return find_exactly<kWords>(origin, direction, corner, out);
   const int height = detail::certain_sign(v.height, v.height_error) * across;
   if (height < 0) return false;
-  return (height > 0 && find_surely(v, out)) || find_exactly(origin, direction, corner, out);
+  return (height > 0 && find_surely(v, out)) || find_exactly<kWords>(origin, direction, corner, out);
+}
+
+/// Whether a meeting, which there is, lies at most at a parameter, as far as float64 is sure.
+TANDEM_HD inline Answer is_within_by_float64(const Meeting& meeting, double last) {
+  if (meeting.t.upper <= last) return Answer::yes;
+  return meeting.t.lower <= last ? Answer::unsure : Answer::no;
 }
 
 /// Returns whether a meeting, which there is, lies at most at a parameter; it may be infinite.
+template <int kWords = detail::kMaxWords>
 TANDEM_HD inline bool is_within(const double (&origin)[3], const double (&direction)[3],
                                 const double (&corner)[3][3], const Meeting& meeting, double last) {
-  if (meeting.t.upper <= last) return true;
-  return meeting.t.lower <= last && is_within_exactly(origin, direction, corner, last);
+  const Answer answer = is_within_by_float64(meeting, last);
+  if (answer != Answer::unsure) return answer == Answer::yes;
+  return is_within_exactly<kWords>(origin, direction, corner, last);
+}
+
+/// A hit of a ray, and what tells it from others.
+struct FoundHit {
+  Meeting meeting;
+  std::uint32_t body, triangle;
+};
+
+/// Whether a hit comes before another one, as far as float64 is sure.
+TANDEM_HD inline Answer comes_before_by_float64(const FoundHit& x, const FoundHit& y) {
+  if (x.meeting.t.upper < y.meeting.t.lower) return Answer::yes;
+  return y.meeting.t.upper < x.meeting.t.lower ? Answer::no : Answer::unsure;
+}
+
+/// Returns whether a hit, of a triangle with these corners, comes before another one: by the parameter, the
+/// body and the triangle.
+template <int kWords = detail::kMaxWords>
+TANDEM_HD inline bool comes_before_exactly(const double (&origin)[3], const double (&direction)[3],
+                                           const FoundHit& x, const double (&of_x)[3][3], const FoundHit& y,
+                                           const double (&of_y)[3][3]) {
+  const int order = compare_exactly<kWords>(origin, direction, of_x, of_y);
+  if (order != 0) return order < 0;
+  return x.body != y.body ? x.body < y.body : x.triangle < y.triangle;
 }
 
 }  // namespace tandem::ray

@@ -38,6 +38,14 @@ TANDEM_HD inline std::uint64_t bits_of(double x) {
 #endif
 }
 
+TANDEM_HD inline double float64_of(std::uint64_t bits) {
+#ifdef __CUDA_ARCH__
+  return __longlong_as_double(static_cast<long long>(bits));
+#else
+  return std::bit_cast<double>(bits);
+#endif
+}
+
 TANDEM_HD inline Magnitude magnitude(double x) {
   const std::uint64_t bits = bits_of(x);
   const std::uint64_t fraction = bits & ((std::uint64_t{1} << 52) - 1);

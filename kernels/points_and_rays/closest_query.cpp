@@ -5,111 +5,37 @@
 #include "kernels/common/check_options.h"
 #include "kernels/common/component_labels.h"
 #include "kernels/common/lane_variant.h"
-#include "kernels/contact/candidate.h"
 #include "kernels/geometry/inside_test.h"
-#include "kernels/geometry/triangle_distance.h"
+#include "kernels/points_and_rays/closest_search.h"
 #include "kernels/points_and_rays/probe_ways.h"
 #include "kernels/points_and_rays/scene_probe.h"
 
 namespace tandem {
 namespace {
 
-// The search for the closest point of one point.
-struct ClosestSearch {
+using probe::distance_to;
+using probe::may_cross;
+using probe::walk_world_boxes;
+
+// The search for the closest point of one point, with the bodies of a scene.
+struct SceneSearch : ClosestSearch {
   const SceneState* scene = nullptr;
-  DistanceTolerance tolerance;
-  double point[3];
-  std::uint32_t body;
-  double upper;  // of the distance; before one is found, what is at least so far is beyond reach
-  double lower;  // what was settled is not nearer
-  double floor;  // nor is what was passed over
-  TriangleDistance best;
-  std::uint32_t best_body, best_triangle;  // of `best`; kNoIndex: none
 
-  std::uint64_t blocks = 0, by_float64 = 0;
-
-  void begin(const std::array<double, 3>& p, double reach) {
-    std::copy_n(p.data(), 3, point);
-    upper = reach < HUGE_VAL ? std::nextafter(reach, HUGE_VAL) : reach;
-    lower = floor = best.interval.upper = HUGE_VAL;
-    best_body = best_triangle = kNoIndex;
+  void corners(std::uint32_t of, std::uint32_t triangle, double (&out)[3][3]) const {
+    const PosedTree& tree = scene->bodies[of];
+    pose_corners(tree.pose, tree.tree, triangle, out);
   }
-
-  // Bounds the distance of a triangle of the body by float64.
-  void settle(std::uint32_t triangle) {
-    ++by_float64;
-    const PosedTree& tree = scene->bodies[body];
-    TrianglePair pair;
-    pose_corners(tree.pose, tree.tree, triangle, pair.a);
-    for (double(&corner)[3] : pair.b) std::copy_n(point, 3, corner);
-    const TriangleDistance found = point_distance(pair, tolerance);
-    lower = std::min(lower, found.interval.lower);
-    upper = std::min(upper, found.interval.upper);
-    if (!(found.interval.upper < best.interval.upper)) return;
-    best = found;
-    best_body = body;
-    best_triangle = triangle;
-  }
-
-  // Settles what may be nearer than the tolerance lets pass, and the first in any case.
-  void settle(const ClosestCandidate* candidates, std::uint32_t count, const FrameLengths& lengths) {
-    std::uint32_t nearest = 0;
-    for (std::uint32_t i = 1; i < count; ++i) {
-      if (candidates[i].lower < candidates[nearest].lower) nearest = i;
-    }
-    settle(candidates[nearest].triangle);
-    for (std::uint32_t i = 0; i < count; ++i) {
-      if (i == nearest) continue;
-      const double least = static_cast<double>(candidates[i].lower) * lengths.least_in_world;
-      if (best_triangle != kNoIndex && !(least < nearness_below(tolerance, upper)))
-        floor = std::min(floor, least);
-      else
-        settle(candidates[i].triangle);
-    }
+  bool distance(const TrianglePair& pair, const DistanceTolerance& wanted, TriangleDistance& out) const {
+    if (!point_distance_by_float64(pair, wanted, out)) out = triangle_distance(pair, wanted);
+    return true;
   }
 };
 
 void take_candidates(PointTask& task, const ClosestCandidate* candidates, std::uint32_t count) {
-  ClosestSearch& search = *static_cast<ClosestSearch*>(task.context);
+  SceneSearch& search = *static_cast<SceneSearch*>(task.context);
   search.upper = std::min(search.upper, task.upper);
-  search.settle(candidates, count, *task.lengths);
+  search.settle(search, candidates, count, *task.lengths);
   task.upper = search.upper;
-}
-
-// How far a point is from a box at least.
-double distance_to(const WorldBox& box, const double (&p)[3]) {
-  double largest = 0, square = 0;
-  for (int k = 0; k < 3; ++k) {
-    const double gap = std::max({box.lo[k] - p[k], p[k] - box.hi[k], 0.0});
-    largest = std::max(largest, gap);
-    square += gap * gap;
-  }
-  // Squares may be too large or too small to be told.
-  return (largest < 0x1p500 && largest > 0x1p-500 ? std::sqrt(square) : largest) * (1 - 0x1p-50);
-}
-
-// Whether the ray of inside_test.h may meet a box.
-bool may_cross(const WorldBox& box, const double (&p)[3]) {
-  return box.lo[1] <= p[1] && p[1] <= box.hi[1] && box.lo[2] <= p[2] && p[2] <= box.hi[2] &&
-         p[0] <= box.hi[0];
-}
-
-// A walk by world boxes in float64, of a body that float32 cannot take. wanted(box), take(triangle).
-template <typename Wanted, typename Take>
-void walk_world_boxes(const PosedTree& tree, const Wanted& wanted, const Take& take, std::uint64_t& blocks) {
-  std::uint32_t stack[3 * kMaxDepth + 4], height = 0;
-  stack[height++] = 0;
-  while (height > 0) {
-    const Block& block = tree.tree.blocks[stack[--height]];
-    ++blocks;
-    for (int i = 0; i < kNodesPerBlock; ++i) {
-      if (block.kind[i] == NodeKind::imaginary || !wanted(node_world_box(tree.pose, block, i))) continue;
-      if (block.is_leaf_block())
-        take(block.index[i]);
-      else
-        stack[height++] = block.index[i];
-    }
-  }
 }
 
 // The triangles of an asset that belong to open components.
@@ -151,18 +77,18 @@ struct ClosestQuery::State : Allocated {
   RayWalk walk_ray = best_way(tandem::ray_walk);
   ProbedBodies bodies;
   ProbeOrder order;
-  PerWorker<ClosestSearch> searches;
+  PerWorker<SceneSearch> searches;
   std::uint64_t labels_of = 0;  // the number of the assets
   Buffer<SurfaceLabels> surfaces;
   Buffer<std::uint32_t> labels;
 
   Status label(SceneState& scene);
-  void walk_body(ClosestSearch& search) const;
-  void find(const ClosestOptions& options, std::uint32_t of, ClosestSearch& search, ClosestPoint& row) const;
+  void walk_body(SceneSearch& search) const;
+  void find(const ClosestOptions& options, std::uint32_t of, SceneSearch& search, ClosestPoint& row) const;
   void find_part(const ClosestOptions& options, std::uint32_t of, std::size_t first, std::size_t last,
-                 ClosestSearch& search, ClosestPoint* rows, std::size_t stride) const;
-  void add_side(std::uint32_t body, ClosestSearch& search, ClosestPoint& row) const;
-  void count_crossings(std::uint32_t body, ClosestSearch& search, CrossingCount& count) const;
+                 SceneSearch& search, ClosestPoint* rows, std::size_t stride) const;
+  void add_side(std::uint32_t body, SceneSearch& search, ClosestPoint& row) const;
+  void count_crossings(std::uint32_t body, SceneSearch& search, CrossingCount& count) const;
 
   // Visits one body, or all: see ProbedBodies.
   template <typename Bound, typename Visit>
@@ -173,7 +99,6 @@ struct ClosestQuery::State : Allocated {
 };
 
 Status ClosestQuery::State::label(SceneState& scene) {
-  if (const Status status = scene.require_topology(); status != Status::kOk) return status;
   if (labels_of == scene.assets_id) return Status::kOk;
   labels_of = 0;
   surfaces.clear();
@@ -199,14 +124,16 @@ Status ClosestQuery::State::label(SceneState& scene) {
   return Status::kOk;
 }
 
-void ClosestQuery::State::walk_body(ClosestSearch& search) const {
+void ClosestQuery::State::walk_body(SceneSearch& search) const {
   const PosedTree& tree = search.scene->bodies[search.body];
   const LocalFrame& frame = bodies.frame(search.body);
   PointTask task;
   if (!local_point(frame, search.point, task.point)) {
-    return walk_world_boxes(
-        tree, [&](const WorldBox& box) { return distance_to(box, search.point) < search.upper; },
-        [&](std::uint32_t triangle) { search.settle(triangle); }, search.blocks);
+    search.blocks += walk_world_boxes(
+        tree.pose, tree.tree.blocks,
+        [&](const WorldBox& box) { return distance_to(box, search.point) < search.upper; },
+        [&](std::uint32_t triangle) { return search.settle(search, triangle); });
+    return;
   }
   task.tree = &tree.tree;
   task.lengths = &frame;
@@ -219,7 +146,7 @@ void ClosestQuery::State::walk_body(ClosestSearch& search) const {
 }
 
 // of: the body that is looked at; kNoIndex: all are.
-void ClosestQuery::State::find(const ClosestOptions& options, std::uint32_t of, ClosestSearch& search,
+void ClosestQuery::State::find(const ClosestOptions& options, std::uint32_t of, SceneSearch& search,
                                ClosestPoint& row) const {
   const auto bound = [&](const WorldBox& box) { return distance_to(box, search.point); };
   visit(of, bound, search.upper, [&](std::uint32_t body) {
@@ -227,22 +154,9 @@ void ClosestQuery::State::find(const ClosestOptions& options, std::uint32_t of, 
     search.body = body;
     walk_body(search);
   });
-  row = {std::min({search.lower, search.floor, search.upper}),
-         HUGE_VAL,
-         {},
-         kNoIndex,
-         kNoIndex,
-         kNoIndex,
-         kNoIndex,
-         0,
-         0};
-  if (search.best_triangle != kNoIndex && row.lower <= options.reach) {
-    row.upper = std::min(search.upper, search.best.interval.upper);
-    std::copy_n(search.best.point_a, 3, row.position);
-    row.body = search.best_body;
-    row.triangle = search.best_triangle;
+  row = search.row(options.reach);
+  if (row.body != kNoIndex)
     row.face = search.scene->bodies[row.body].tree.triangles[row.triangle].source_face();
-  }
   if (!options.sides) return;
   const auto around = [&](const WorldBox& box) { return bound(box) == 0 ? 0 : HUGE_VAL; };
   visit(of, around, 0, [&](std::uint32_t body) { add_side(body, search, row); });
@@ -251,21 +165,22 @@ void ClosestQuery::State::find(const ClosestOptions& options, std::uint32_t of, 
 // Each point's search begins with the triangle that was closest to the one before it in the part. rows: of
 // the first point, and the others at multiples of the stride.
 void ClosestQuery::State::find_part(const ClosestOptions& options, std::uint32_t of, std::size_t first,
-                                    std::size_t last, ClosestSearch& search, ClosestPoint* rows,
+                                    std::size_t last, SceneSearch& search, ClosestPoint* rows,
                                     std::size_t stride) const {
+  const double beyond_reach = beyond(options.reach);
   for (std::size_t i = first; i < last; ++i) {
     const std::uint32_t body = search.best_body, triangle = search.best_triangle;
     fetch_ahead(options.points[order.ahead(i)].data());
-    search.begin(options.points[order[i]], options.reach);
+    search.begin(options.points[order[i]].data(), beyond_reach);
     if (i != first && triangle != kNoIndex) {
       search.body = body;
-      search.settle(triangle);
+      search.settle(search, triangle);
     }
     find(options, of, search, rows[stride * order[i]]);
   }
 }
 
-void ClosestQuery::State::count_crossings(std::uint32_t body, ClosestSearch& search,
+void ClosestQuery::State::count_crossings(std::uint32_t body, SceneSearch& search,
                                           CrossingCount& count) const {
   const PosedTree& tree = search.scene->bodies[body];
   const double along[3] = {1, 0, 0};
@@ -274,9 +189,13 @@ void ClosestQuery::State::count_crossings(std::uint32_t body, ClosestSearch& sea
   const RayReach reach = local_ray(bodies.frame(body), ray, HUGE_VAL, task.ray);
   if (reach == RayReach::misses) return;
   if (reach == RayReach::out_of_range) {
-    return walk_world_boxes(
-        tree, [&](const WorldBox& box) { return may_cross(box, search.point); },
-        [&](std::uint32_t triangle) { count.take(triangle); }, search.blocks);
+    search.blocks += walk_world_boxes(
+        tree.pose, tree.tree.blocks, [&](const WorldBox& box) { return may_cross(box, search.point); },
+        [&](std::uint32_t triangle) {
+          count.take(triangle);
+          return true;
+        });
+    return;
   }
   task.tree = &tree.tree;
   task.limit = count.limit = task.ray.length;
@@ -287,7 +206,7 @@ void ClosestQuery::State::count_crossings(std::uint32_t body, ClosestSearch& sea
 }
 
 // Counts the surfaces of a body that are around the point.
-void ClosestQuery::State::add_side(std::uint32_t body, ClosestSearch& search, ClosestPoint& row) const {
+void ClosestQuery::State::add_side(std::uint32_t body, SceneSearch& search, ClosestPoint& row) const {
   const SceneState& scene = *search.scene;
   if (!scene.is_body(body) || distance_to(scene.boxes[body], search.point) != 0) return;
   const SurfaceLabels& surface = surfaces[scene.instances[body].asset];
@@ -339,7 +258,7 @@ Status ClosestQuery::answer(SceneState& scene, const ClosestOptions& options) {
       !rows_.resize(count * of_each))
     return scene.fail(Status::kOutOfMemory, 0);
   for (std::uint32_t i = 0; i < workers; ++i) {
-    ClosestSearch& search = state.searches[i];
+    SceneSearch& search = state.searches[i];
     search.scene = &scene;
     search.tolerance = options.tolerance;
     search.blocks = search.by_float64 = 0;
@@ -364,8 +283,11 @@ Status ClosestQuery::answer(SceneState& scene, const ClosestOptions& options) {
 
 Status ClosestQuery::find(Scene& in, const ClosestOptions& options) {
   return ask_scene(in, [&](SceneState& scene) {
-    const Status status = check(scene, options);
-    return status == Status::kOk ? answer(scene, options) : status;
+    Status status = check(scene, options);
+    if (status == Status::kOk && options.sides) status = scene.require_topology();
+    if (status != Status::kOk) return status;
+    return scene.device != nullptr && options.bodies.empty() ? scene.ask_device(options, found())
+                                                             : answer(scene, options);
   });
 }
 

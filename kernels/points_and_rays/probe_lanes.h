@@ -3,7 +3,7 @@
 
 #include "kernels/common/lanes.h"
 #include "kernels/common/traversal.h"
-#include "kernels/geometry/frame_distance.h"
+#include "kernels/geometry/frame_probe.h"
 #include "kernels/points_and_rays/probe_walk.h"
 
 // The walks that all variants share: four nodes or four triangles at a time, whatever the machine's vectors.
@@ -95,6 +95,21 @@ struct FourCorners {
   tandem::frame::Point<Four> corner[3];
 };
 
+template <typename Four>
+struct NodeLanes {
+  Four centre[3], half_extent[3];
+};
+
+template <typename Four>
+inline NodeLanes<Four> node_lanes(const Block& block) {
+  NodeLanes<Four> out;
+  for (int k = 0; k < 3; ++k) {
+    out.centre[k] = load_four<Four>(block.centre[k]);
+    out.half_extent[k] = load_four<Four>(block.half_extent[k]);
+  }
+  return out;
+}
+
 /// The corners of four triangles that follow each other, or of as many as there are and the last one again.
 template <typename Four>
 inline FourCorners<Four> four_triangles(const LevelView& tree, std::uint32_t first, std::uint32_t count) {
@@ -161,12 +176,7 @@ class RayWalkBy {
  public:
   /// Begins with task().
   void begin() {
-    for (int k = 0; k < 3; ++k) {
-      o_[k] = Four{} + task_.ray.o[k];
-      inverse_[k] = Four{} + task_.ray.inverse[k];
-      size_[k] = magnitude(inverse_[k]);
-    }
-    slack_ = Four{} + task_.ray.slack;
+    ray_ = probe::ray_in_frame<Four>(task_.ray);
     height_ = block_number_ = leaf_mask_ = 0;
     limit_ = task_.limit;
   }
@@ -214,15 +224,8 @@ class RayWalkBy {
 
   /// The nodes that the ray may meet up to the limit, and where at the earliest.
   unsigned nodes(const Block& block, Four& near) const {
-    Four first{}, last = Four{} + limit_;
-    for (int k = 0; k < 3; ++k) {
-      const Four m = (load_four<Four>(block.centre[k]) - o_[k]) * inverse_[k];
-      const Four r = (load_four<Four>(block.half_extent[k]) + slack_) * size_[k];
-      first = larger(first, m - r);
-      last = lesser(last, m + r);
-    }
-    near = first;
-    return (!less(last, first)).mask();
+    const NodeLanes<Four> lanes = node_lanes<Four>(block);
+    return (!probe::misses_box(ray_, lanes.centre, lanes.half_extent, limit_, near)).mask();
   }
 
   /// Takes the triangles of the leaf, that of the nearest box first.
@@ -230,7 +233,8 @@ class RayWalkBy {
     const Block& block = task_.tree->blocks[block_number_];
     const std::uint32_t first = block.index[0];
     ++task_.blocks;
-    unsigned mask = leaf_mask_ & may_meet(four_triangles<Four>(*task_.tree, first, leaf_count(block)));
+    const FourCorners<Four> corners = four_triangles<Four>(*task_.tree, first, leaf_count(block));
+    unsigned mask = leaf_mask_ & (!probe::passes_triangle(task_.ray, ray_.o, corners.corner)).mask();
     leaf_mask_ = 0;
     while (mask != 0) {
       int next = lowest_bit(mask);
@@ -244,34 +248,8 @@ class RayWalkBy {
     }
   }
 
-  unsigned may_meet(const FourCorners<Four>& t) const {
-    using Corner = tandem::frame::Point<Four>;
-    Four largest{};
-    Corner p[3], e[3];
-    for (int i = 0; i < 3; ++i) {
-      for (int k = 0; k < 3; ++k) {
-        p[i].x[k] = t.corner[i].x[k] - o_[k];
-        e[i].x[k] = t.corner[(i + 1) % 3].x[k] - t.corner[i].x[k];
-        largest = larger(largest, magnitude(e[i].x[k]));
-      }
-    }
-    Four least = side(p[0], e[0]), most = least;
-    for (int i = 1; i < 3; ++i) {
-      const Four w = side(p[i], e[i]);
-      least = lesser(least, w);
-      most = larger(most, w);
-    }
-    const Four bound = task_.ray.edge_factor * largest + task_.ray.least_bound;
-    return (!(less(least, Four{} - bound) & less(bound, most))).mask();
-  }
-
-  Four side(const tandem::frame::Point<Four>& p, const tandem::frame::Point<Four>& e) const {
-    const float* const d = task_.ray.d;
-    return (d[0] * (p.x[1] * e.x[2] - p.x[2] * e.x[1]) + d[1] * (p.x[2] * e.x[0] - p.x[0] * e.x[2])) +
-           d[2] * (p.x[0] * e.x[1] - p.x[1] * e.x[0]);
-  }
-
-  Four o_[3], inverse_[3], size_[3], slack_, leaf_near_;
+  probe::RayInFrame<Four> ray_;
+  Four leaf_near_;
   float limit_;
   unsigned leaf_mask_;  ///< of the triangles of the block that are to be looked at next; 0: its nodes are
   std::uint32_t block_number_, height_;
@@ -321,32 +299,15 @@ class PointWalkBy {
 
   /// Squares of lengths that whatever is below the nodes is away from the point, at least.
   Four bounds(const Block& block) const {
-    Four square[3];
-    for (int k = 0; k < 3; ++k) {
-      const Four gap = magnitude(load_four<Four>(block.centre[k]) - q_[k]) -
-                       (load_four<Four>(block.half_extent[k]) + slack_[k]);
-      const Four beyond = larger(gap, Four{});
-      square[k] = beyond * beyond;
-    }
-    return (square[0] + square[1]) + square[2];
+    const NodeLanes<Four> lanes = node_lanes<Four>(block);
+    return probe::box_bound(q_, slack_, lanes.centre, lanes.half_extent);
   }
 
   void take(const Block& block, unsigned mask) {
     const std::uint32_t first = block.index[0];
     ++task_.blocks;
-    FourCorners<Four> t = four_triangles<Four>(*task_.tree, first, leaf_count(block));
-    Four largest{};
-    for (int i = 0; i < 3; ++i) {
-      for (int k = 0; k < 3; ++k) {
-        t.corner[i].x[k] = t.corner[i].x[k] - q_[k];
-        largest = larger(largest, magnitude(t.corner[i].x[k]));
-      }
-    }
-    const auto nearest = distance::nearest_to_origin<Four>(t.corner, distance::value_of<Four>(0x1p-60));
-    const auto& n = nearest.along;
-    const Four gap = distance::least_of(distance::dot(n, t.corner[0]), distance::dot(n, t.corner[1]),
-                                        distance::dot(n, t.corner[2]));
-    const auto interval = distance::interval_of(nearest, gap, largest, task_.point.error);
+    const FourCorners<Four> t = four_triangles<Four>(*task_.tree, first, leaf_count(block));
+    const auto interval = probe::triangle_interval(q_, task_.point.error, t.corner);
     for (; mask != 0; mask &= mask - 1) {
       const int i = lowest_bit(mask);
       if (!(interval.lower.v[i] < length_)) continue;

@@ -11,11 +11,11 @@ float bound_limit(const FrameLengths& lengths, double distance) {
 }
 
 float length_limit(const FrameLengths& lengths, double distance) {
-  return rounded_up(distance / lengths.least_in_world);
+  return probe::length_limit_of(lengths, distance);
 }
 
 double world_upper(const FrameLengths& lengths, float length) {
-  return static_cast<double>(length) * lengths.most_in_world;
+  return probe::world_upper_of(lengths, length);
 }
 
 RayWalk ray_walk(BlockPairVariant variant) {

@@ -7,15 +7,13 @@
 #include "kernels/common/lane_variant.h"
 #include "kernels/contact/candidate.h"
 #include "kernels/points_and_rays/probe_ways.h"
+#include "kernels/points_and_rays/ray_rows.h"
 #include "kernels/points_and_rays/scene_probe.h"
 
 namespace tandem {
 namespace {
 
-struct FoundHit {
-  ray::Meeting meeting;
-  std::uint32_t body, triangle;
-};
+using ray::FoundHit;
 
 // Rays that a thread orders and answers at a time: few enough for the third-level cache, and enough that
 // neighbours are near each other.
@@ -50,16 +48,13 @@ struct RaySearch {
     pose_corners(tree.pose, tree.tree, hit.triangle, out);
   }
 
-  // Whether a hit comes before another one. corner: of x.
   bool comes_before(const FoundHit& x, const FoundHit& y) const {
-    if (x.meeting.t.upper < y.meeting.t.lower) return true;
-    if (y.meeting.t.upper < x.meeting.t.lower) return false;
+    const ray::Answer answer = ray::comes_before_by_float64(x, y);
+    if (answer != ray::Answer::unsure) return answer == ray::Answer::yes;
     double of_x[3][3], of_y[3][3];
     corners_of(x, of_x);
     corners_of(y, of_y);
-    const int order = ray::compare_exactly(ray.origin, ray.direction, of_x, of_y);
-    if (order != 0) return order < 0;
-    return x.body != y.body ? x.body < y.body : x.triangle < y.triangle;
+    return ray::comes_before_exactly(ray.origin, ray.direction, x, of_x, y, of_y);
   }
 
   // Looks at a triangle. False: the search is over.
@@ -89,44 +84,22 @@ float take_triangle(void* context, std::uint32_t triangle) {
   return local_limit(search.ray, *search.local, search.last);
 }
 
-// A walk by world boxes in float64, of a body that float32 cannot take.
+// A walk of a body that float32 cannot take.
 void walk_world_boxes(const PosedTree& tree, RaySearch& search) {
-  std::uint32_t stack[3 * kMaxDepth + 4], height = 0;
-  stack[height++] = 0;
-  while (height > 0) {
-    const Block& block = tree.tree.blocks[stack[--height]];
-    ++search.blocks;
-    for (int i = 0; i < kNodesPerBlock; ++i) {
-      if (block.kind[i] == NodeKind::imaginary) continue;
-      const WorldBox box = node_world_box(tree.pose, block, i);
-      double first = 0, last = search.last / search.ray.factor;
-      if (!meets_box(search.ray, box.lo, box.hi, first, last)) continue;
-      if (!block.is_leaf_block())
-        stack[height++] = block.index[i];
-      else if (!search.take(block.index[i]))
-        return;
-    }
-  }
+  const auto wanted = [&](const WorldBox& box) {
+    double first = 0, last = search.last / search.ray.factor;
+    return meets_box(search.ray, box.lo, box.hi, first, last);
+  };
+  search.blocks += probe::walk_world_boxes(tree.pose, tree.tree.blocks, wanted,
+                                           [&](std::uint32_t triangle) { return search.take(triangle); });
 }
 
 bool is_known(RayHits hits) {
   return hits == RayHits::first || hits == RayHits::any || hits == RayHits::all;
 }
 
-RayHit no_hit(std::uint32_t ray) {
-  return {HUGE_VAL, {0, 0}, ray, kNoIndex, kNoIndex, kNoIndex};
-}
-
 RayHit row_of(const SceneState& scene, std::uint32_t ray, const FoundHit& hit) {
-  RayHit row;
-  row.t = hit.meeting.t.lower + (hit.meeting.t.upper - hit.meeting.t.lower) / 2;
-  row.weight[0] = hit.meeting.weight[0];
-  row.weight[1] = hit.meeting.weight[1];
-  row.ray = ray;
-  row.body = hit.body;
-  row.triangle = hit.triangle;
-  row.face = scene.bodies[hit.body].tree.triangles[hit.triangle].source_face();
-  return row;
+  return tandem::row_of(ray, hit, scene.bodies[hit.body].tree.triangles[hit.triangle].source_face());
 }
 
 Status check(SceneState& scene, const RayOptions& options) {
@@ -206,7 +179,7 @@ bool RayBatch::walks_on(RaySearch& search, RayTask& task) const {
 // Writes what was found of a ray.
 void RayBatch::take_hits(std::uint32_t ray, RaySearch& search, RayWorker& worker) const {
   if (rows != nullptr) {
-    rows[ray] = search.found ? row_of(scene, ray, search.best) : no_hit(ray);
+    rows[ray] = search.found ? row_of(scene, ray, search.best) : row_without_hit(ray);
     return;
   }
   std::sort(search.all.data(), search.all.data() + search.all.size(),
@@ -253,7 +226,7 @@ void RayBatch::answer(std::uint32_t first, std::uint32_t last, RayWorker& worker
     double begin = 0, end = HUGE_VAL;
     if (!meets_box(ray, bounds.lo, bounds.hi, begin, end)) {
       if (rows != nullptr)
-        rows[i] = no_hit(i);
+        rows[i] = row_without_hit(i);
       else
         count[i] = 0;
       return false;
@@ -338,7 +311,8 @@ Status RayQuery::answer(SceneState& scene, const RayOptions& options) {
 Status RayQuery::find(Scene& in, const RayOptions& options) {
   return ask_scene(in, [&](SceneState& scene) {
     const Status status = check(scene, options);
-    return status == Status::kOk ? answer(scene, options) : status;
+    if (status != Status::kOk) return status;
+    return scene.device != nullptr ? scene.ask_device(options, found()) : answer(scene, options);
   });
 }
 

@@ -7,6 +7,7 @@
 
 #include "kernels/common/block_pair.h"
 #include "kernels/geometry/local_frame.h"
+#include "kernels/points_and_rays/body_tree.h"
 #include "kernels/scene/body_visit.h"
 #include "kernels/scene/scene_state.h"
 
@@ -19,9 +20,7 @@ namespace tandem {
 inline constexpr std::size_t kProbesAtOnce = 512;
 
 inline bool is_in_range(const std::array<double, 3>& point) {
-  bool in_range = true;
-  for (double x : point) in_range = in_range && std::fabs(x) <= kLargestWorldCoordinate;
-  return in_range;
+  return probe::is_in_range(point.data());
 }
 
 /// The bodies of a scene as points and rays see them, kept until one changes.
@@ -37,10 +36,10 @@ class ProbedBodies {
 
   const BoxTree& tree() const { return boxes_; }
 
-  /// Visits bodies as BodyVisit has it; visit(body) may make the limit less.
+  /// As visit_bodies() does.
   template <typename Bound, typename Visit>
   void visit(const Bound& bound, const double& limit, const Visit& visit) const {
-    visit_nearest(boxes_, bound, limit, visit);
+    visit_bodies(boxes_, bound, limit, visit);
   }
 
  private:

@@ -1,6 +1,7 @@
 #include "tandem/kernels/gpu_scene.h"
 
 #include <algorithm>
+#include <array>
 #include <memory>
 #include <new>
 #include <span>
@@ -12,12 +13,14 @@
 #include "tandem/formats/gpu_memory.h"
 #include "tandem/formats/gpu_status.h"
 #include "tandem/kernels/gpu_broad_phase.h"
+#include "tandem/kernels/gpu_closest_query.h"
 #include "tandem/kernels/gpu_containment_query.h"
 #include "tandem/kernels/gpu_deformer.h"
 #include "tandem/kernels/gpu_distance_query.h"
 #include "tandem/kernels/gpu_excluded_pairs.h"
 #include "tandem/kernels/gpu_impact_query.h"
 #include "tandem/kernels/gpu_manifold_query.h"
+#include "tandem/kernels/gpu_ray_query.h"
 #include "tandem/kernels/gpu_tolerance_query.h"
 #include "tandem/runtime/upload.h"
 
@@ -136,6 +139,41 @@ class Gpu final : public SceneDevice {
     });
   }
 
+  Status find(SceneState& scene, const ClosestOptions& options,
+              const DeviceAnswer<ClosestPoint, ClosestCounters>& found) override {
+    const auto find_closest = [&](auto& query) {
+      GpuClosestOptions on_gpu;
+      on_gpu.point_count = static_cast<std::uint32_t>(options.points.size());
+      on_gpu.tolerance = options.tolerance;
+      on_gpu.reach = options.reach;
+      on_gpu.sides = options.sides;
+      on_gpu.looked_at = looked_at();
+      Status status = upload_triples(options.points, points_on_gpu_, on_gpu.points);
+      if (status == Status::kOk) status = query.find(instances_, on_gpu, kStream);
+      if (status == Status::kOk) status = copy(query.rows(), on_gpu.point_count, found.rows);
+      return status;
+    };
+    return ask<GpuClosestQuery>(scene, found, Status::kOk, find_closest, options.points.empty());
+  }
+
+  Status find(SceneState& scene, const RayOptions& options,
+              const DeviceAnswer<RayHit, RayCounters>& found) override {
+    const auto find_hits = [&](auto& query) {
+      GpuRayOptions on_gpu;
+      on_gpu.ray_count = static_cast<std::uint32_t>(options.origins.size());
+      on_gpu.reach = options.reach;
+      on_gpu.hits = options.hits;
+      on_gpu.looked_at = looked_at();
+      Status status = upload_triples(options.origins, points_on_gpu_, on_gpu.origins);
+      if (status == Status::kOk)
+        status = upload_triples(options.directions, directions_on_gpu_, on_gpu.directions);
+      if (status == Status::kOk) status = query.find(instances_, on_gpu, kStream);
+      if (status == Status::kOk) status = copy(query.rows(), query.report().rows, found.rows);
+      return status;
+    };
+    return ask<GpuRayQuery>(scene, found, Status::kOk, find_hits, options.origins.empty());
+  }
+
   Status find(SceneState& scene, const ImpactOptions& options, bool finds_pairs,
               const DeviceAnswer<Impact, ImpactCounters>& found) override {
     GpuImpactOptions on_gpu;
@@ -244,7 +282,8 @@ class Gpu final : public SceneDevice {
     const std::size_t count = scene.instances.size();
     const bool any_removed = std::any_of(scene.instances.data(), scene.instances.data() + count,
                                          [](const Instance& instance) { return instance.asset == kNoIndex; });
-    if (!asset_.resize(count) || !pose_.resize(count)) return Status::kOutOfMemory;
+    if (!asset_.resize(count) || !pose_.resize(count) || !is_there_.resize(any_removed ? count : 0))
+      return Status::kOutOfMemory;
     if (any_removed && (!group_.resize(count) || !mask_.resize(count))) return Status::kOutOfMemory;
     const PairFilter filter = scene.filter();
     for (std::uint32_t i = 0; i < count; ++i) {
@@ -252,11 +291,13 @@ class Gpu final : public SceneDevice {
       asset_[i] = is_there ? scene.instances[i].asset : 0;
       pose_[i] = is_there ? scene.instances[i].pose : kIdentityPose;
       if (!any_removed) continue;
+      is_there_[i] = is_there;
       group_[i] = !is_there ? 0 : filter.group != nullptr ? filter.group[i] : ~0u;
       mask_[i] = !is_there ? 0 : filter.mask != nullptr ? filter.mask[i] : ~0u;
     }
     Status status = upload(asset_.view(), asset_on_gpu_);
     if (status == Status::kOk) status = upload(pose_.view(), pose_on_gpu_);
+    if (status == Status::kOk) status = upload(is_there_.view(), is_there_on_gpu_);
     instances_ = {asset_on_gpu_.data(), pose_on_gpu_.data(), static_cast<std::uint32_t>(count)};
     if (status == Status::kOk) status = excluded_.upload(filter.excluded, kStream);
     filter_ = {};
@@ -284,6 +325,14 @@ class Gpu final : public SceneDevice {
     on_gpu = entries.size() != 0 ? room.data() : nullptr;
     return status;
   }
+  Status upload_triples(std::span<const std::array<double, 3>> triples, GpuArray<double>& room,
+                        const double*& on_gpu) {
+    const Status status = upload(std::span(triples.data()->data(), 3 * triples.size()), room);
+    on_gpu = room.data();
+    return status;
+  }
+  // What a question about points and rays looks at; null: all.
+  const std::uint8_t* looked_at() const { return is_there_.size() != 0 ? is_there_on_gpu_.data() : nullptr; }
   static Status wait() { return status_of(cudaStreamSynchronize(kStream)); }
 
   Status upload_pairs(std::span<const ObjectPair> pairs) {
@@ -421,9 +470,12 @@ class Gpu final : public SceneDevice {
 
   // The arrays that are copied, and their copies.
   Buffer<std::uint32_t> asset_, group_, mask_;
+  Buffer<std::uint8_t> is_there_;  // of each body: 0 where it was removed; none where no body was
   Buffer<Pose> pose_;
   Buffer<RigidMotion> motions_;
   GpuArray<std::uint32_t> asset_on_gpu_, group_on_gpu_, mask_on_gpu_, world_on_gpu_, pair_count_;
+  GpuArray<std::uint8_t> is_there_on_gpu_;
+  GpuArray<double> points_on_gpu_, directions_on_gpu_;
   GpuArray<Pose> pose_on_gpu_;
   GpuArray<Motion> motion_on_gpu_;
   GpuArray<RigidMotion> motions_on_gpu_;

@@ -3,10 +3,12 @@
 #include <span>
 
 #include "tandem/formats/allocator.h"
+#include "tandem/kernels/closest_query.h"
 #include "tandem/kernels/containment_query.h"
 #include "tandem/kernels/distance_query.h"
 #include "tandem/kernels/impact_query.h"
 #include "tandem/kernels/manifold_query.h"
+#include "tandem/kernels/ray_query.h"
 #include "tandem/kernels/tolerance_query.h"
 
 namespace tandem {
@@ -34,6 +36,12 @@ class SceneDevice : public Allocated {
                       const DeviceAnswer<ObjectDistance, DistanceCounters>& found) = 0;
   virtual Status find(SceneState& scene, const ToleranceOptions& options,
                       const DeviceAnswer<PairVerdict, ToleranceCounters>& found) = 0;
+
+  /// The options of these two are sound, as are the points and rays.
+  virtual Status find(SceneState& scene, const ClosestOptions& options,
+                      const DeviceAnswer<ClosestPoint, ClosestCounters>& found) = 0;
+  virtual Status find(SceneState& scene, const RayOptions& options,
+                      const DeviceAnswer<RayHit, RayCounters>& found) = 0;
 
   /// finds_pairs: the question is about the pairs whose swept boxes meet, which the device finds.
   virtual Status find(SceneState& scene, const ImpactOptions& options, bool finds_pairs,

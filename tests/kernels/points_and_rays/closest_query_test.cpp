@@ -10,6 +10,7 @@
 
 #include "kernels/contact/contact_query_fixture.h"
 #include "kernels/geometry/triangle_distance.h"
+#include "kernels/points_and_rays/hostile_probes.h"
 #include "kernels/points_and_rays/probe_ways.h"
 #include "kernels/points_and_rays/ray_oracle.h"
 #include "kernels/points_and_rays/scene_probe.h"
@@ -20,8 +21,9 @@
 namespace tandem {
 namespace {
 
+using test::hostile_points;
 using test::PosedTriangle;
-using Vector = std::array<double, 3>;
+using Vector = test::Place;
 
 std::vector<std::vector<PosedTriangle>> posed(const BodyScene& scene) {
   std::vector<std::vector<PosedTriangle>> out;
@@ -31,30 +33,6 @@ std::vector<std::vector<PosedTriangle>> posed(const BodyScene& scene) {
 
 TrianglePair pair_of(const PosedTriangle& t, const Vector& point) {
   return test::pair_of(t, {point, point, point});
-}
-
-/// Points anywhere, on triangles, in their planes, and at corners.
-std::vector<Vector> hostile_points(RandomPoses& random, const std::vector<std::vector<PosedTriangle>>& bodies,
-                                   int count) {
-  double size = 0;
-  for (const auto& body : bodies) {
-    for (const auto& t : body)
-      size = std::max({size, std::abs(t[0][0]), std::abs(t[0][1]), std::abs(t[0][2])});
-  }
-  std::vector<Vector> points;
-  for (int i = 0; i < count; ++i) {
-    const auto& body = bodies[random.below(bodies.size())];
-    const PosedTriangle& t = body[random.below(body.size())];
-    Vector p;
-    const double a = random.symmetric(2), b = i % 3 == 0 ? random.symmetric(2) : 0;
-    for (std::size_t k = 0; k < 3; ++k) {
-      p[k] = i % 5 == 0   ? random.symmetric(3 * size)
-             : i % 5 == 1 ? t[0][k]
-                          : t[0][k] + a * (t[1][k] - t[0][k]) + b * (t[2][k] - t[0][k]);
-    }
-    points.push_back(p);
-  }
-  return points;
 }
 
 /// Returns a bound of the distance of a point and a triangle, near it from below. For any n, no point of the

@@ -9,6 +9,7 @@
 
 #include "kernels/contact/contact_query_fixture.h"
 #include "kernels/geometry/ray_triangle.h"
+#include "kernels/points_and_rays/hostile_probes.h"
 #include "kernels/points_and_rays/probe_ways.h"
 #include "kernels/points_and_rays/ray_oracle.h"
 #include "kernels/points_and_rays/scene_probe.h"
@@ -18,67 +19,13 @@
 namespace tandem {
 namespace {
 
+using test::all_of;
+using test::hostile_rays;
+using test::in_leaf_order;
 using test::PosedTriangle;
-using Vector = std::array<double, 3>;
-
-struct Rays {
-  std::vector<Vector> origins, directions;
-
-  void add(const Vector& from, const Vector& along) {
-    origins.push_back(from);
-    directions.push_back(along);
-  }
-  RayOptions options(RayHits hits) const {
-    return {.origins = origins, .directions = directions, .hits = hits};
-  }
-};
-
-Vector random_vector(RandomPoses& random, double size) {
-  return {random.symmetric(size), random.symmetric(size), random.symmetric(size)};
-}
-
-/// A point of a triangle: a corner, one of an edge, or of the inside.
-Vector aimed_at(RandomPoses& random, const PosedTriangle& t) {
-  double weight[3] = {random.uniform(0, 1), random.uniform(0, 1), random.uniform(0, 1)};
-  const auto kind = random.below(4);
-  if (kind == 0) weight[1] = weight[2] = 0, weight[0] = 1;
-  if (kind == 1) weight[0] = 0, weight[1] = weight[2] = 0.5;
-  if (kind == 2) weight[random.below(3)] = 0;
-  const double sum = weight[0] + weight[1] + weight[2];
-  Vector out;
-  for (std::size_t k = 0; k < 3; ++k)
-    out[k] = (weight[0] * t[0][k] + weight[1] * t[1][k] + weight[2] * t[2][k]) / sum;
-  return out;
-}
-
-/// Rays that are aimed at triangles, begin on them, lie along their edges or in their planes, or go anywhere.
-Rays hostile_rays(RandomPoses& random, const std::vector<PosedTriangle>& triangles, double size, int count) {
-  Rays rays;
-  for (int i = 0; i < count; ++i) {
-    const PosedTriangle& t = triangles[random.below(triangles.size())];
-    const PosedTriangle& other = triangles[random.below(triangles.size())];
-    const Vector to = aimed_at(random, t);
-    Vector from = aimed_at(random, other), along;
-    if (random.below(3) != 0) from = random_vector(random, 3 * size);
-    const double length = std::ldexp(1.0, static_cast<int>(random.below(9)) - 4);
-    for (std::size_t k = 0; k < 3; ++k) along[k] = (to[k] - from[k]) * length;
-    const auto kind = random.below(7);
-    if (kind == 0) along = random_vector(random, 1);
-    if (kind == 1) along = {0, 0, 0}, along[random.below(3)] = random.below(2) != 0 ? size : -size;
-    if (kind == 2) {
-      from = t[random.below(3)];
-      for (std::size_t k = 0; k < 3; ++k) along[k] = t[1][k] - t[0][k], from[k] -= along[k] * 2;
-    }
-    if (kind == 3) {
-      // In the plane, to the middle of an edge; exactly so where the sums are exact, as of float32 corners.
-      for (std::size_t k = 0; k < 3; ++k)
-        along[k] = (t[1][k] - t[0][k]) + (t[2][k] - t[0][k]), from[k] = t[0][k] - along[k];
-    }
-    if (along == Vector{0, 0, 0}) along[2] = 1;
-    rays.add(from, along);
-  }
-  return rays;
-}
+using test::Rays;
+using test::size_of;
+using Vector = test::Place;
 
 /// All triangles that a ray meets, by the oracle: by ascending parameter, body and triangle.
 struct OracleHit {
@@ -101,35 +48,6 @@ std::vector<OracleHit> oracle_hits(const Vector& origin, const Vector& direction
     return RayOracle::compare(x.oracle, y.oracle) < 0;
   });
   return hits;
-}
-
-/// The triangles of all bodies in leaf order.
-std::vector<std::vector<PosedTriangle>> in_leaf_order(const BodyScene& scene) {
-  std::vector<std::vector<PosedTriangle>> out;
-  for (std::uint32_t i = 0; i < scene.instances.size(); ++i) {
-    const std::vector<PosedTriangle> by_face = posed_triangles(scene, i);
-    const LevelView level = scene.assets.views()[scene.instances[i].asset].level();
-    out.emplace_back();
-    for (std::uint32_t t = 0; t < level.triangle_count; ++t)
-      out.back().push_back(by_face[level.triangles[t].source_face()]);
-  }
-  return out;
-}
-
-std::vector<PosedTriangle> all_of(const std::vector<std::vector<PosedTriangle>>& bodies) {
-  std::vector<PosedTriangle> out;
-  for (const auto& body : bodies) out.insert(out.end(), body.begin(), body.end());
-  return out;
-}
-
-double size_of(const std::vector<PosedTriangle>& triangles) {
-  double size = 0;
-  for (const auto& t : triangles) {
-    for (const auto& corner : t) {
-      for (double x : corner) size = std::max(size, std::abs(x));
-    }
-  }
-  return size;
 }
 
 void expect_hit(const RayHit& row, const OracleHit& expected) {
@@ -224,12 +142,7 @@ TEST(Rays, NoneSlipsThroughAnEdgeOrACorner) {
   for (int turn = 0; turn < 3; ++turn) {
     if (turn != 0) bodies.instances[0].pose = test::any_rotation(random);
     const auto triangles = in_leaf_order(bodies)[0];
-    Rays rays;
-    for (int i = 0; i < test::trials(20000, 20); ++i) {
-      const Vector to = aimed_at(random, triangles[random.below(triangles.size())]);
-      rays.add(random_vector(random, 0.5), {});
-      for (std::size_t k = 0; k < 3; ++k) rays.directions.back()[k] = to[k] - rays.origins.back()[k];
-    }
+    const Rays rays = test::rays_from_inside(random, triangles, test::trials(20000, 20));
     Scene scene;
     ASSERT_EQ(scene.set_assets(bodies.assets.views()), Status::kOk);
     ASSERT_EQ(scene.place(bodies.instances), Status::kOk);
@@ -283,7 +196,7 @@ TEST(Rays, EveryWayNamesTheSameTriangles) {
     out.push_back(static_cast<std::uint32_t>(task.blocks));
   };
   for (int i = 0; i < 2000; ++i) {
-    const Vector from = random_vector(random, 2), along = random_vector(random, 1);
+    const Vector from = test::random_place(random, 2), along = test::random_place(random, 1);
     const WorldRay ray = world_ray(from.data(), along.data(), HUGE_VAL);
     std::vector<std::uint32_t> plain;
     named_by(ray_walk(BlockPairVariant::scalar), ray, plain);

@@ -49,6 +49,8 @@ struct BoxTree {
     items.clear(), groups.clear(), kinds.clear();
     levels = 0;
   }
+  std::size_t count() const { return items.size(); }
+  std::uint32_t body(std::size_t place) const { return items[place].box; }
   int top() const { return levels - 1; }
   const Group* level(int i) const { return groups.data() + level_begin[i]; }
   const Kinds* kinds_of(int i) const { return kinds.data() + level_begin[i]; }

@@ -42,7 +42,7 @@ class Robot:
         self.assets = [tandem.build(*mesh, levels=levels) for mesh in self.meshes]
         self.scene, self.coarse = tandem.Scene(self.assets), None
         self._place(self.scene)
-        at_rest = self.scene.configurations(np.arange(len(joints)), transform=self.poses([pinocchio.neutral(self.model)]), pairs="all").pairs
+        at_rest = self.scene.configurations(np.arange(len(joints)), pose=self.poses([pinocchio.neutral(self.model)]), pairs="all").pairs
         self.excluded += [(a, b) for _, a, b, *_ in at_rest.tolist() if b < len(joints)]
         self._place(self.scene)
         if levels is not None:
@@ -61,12 +61,13 @@ class Robot:
         return np.array(shape.vertices()) * link.meshScale, np.array(corners)
 
     def poses(self, configurations):
-        """Of each link in each configuration, (k, links, 4, 4)."""
-        made = np.empty((len(configurations), len(self.links), 4, 4))
+        """Of each link in each configuration, (k, links, 4, 3): the rows of the rotation, then the translation. A scene takes that array as it is."""
+        made = np.empty((len(configurations), len(self.links), 4, 3))
         for poses, configuration in zip(made, configurations, strict=True):
             pinocchio.forwardKinematics(self.model, self.data, configuration)
-            for i, link in enumerate(self.links):
-                poses[i] = (self.data.oMi[link.parentJoint] * link.placement).homogeneous
+            for pose, link in zip(poses, self.links, strict=True):
+                placed = self.data.oMi[link.parentJoint] * link.placement
+                pose[:3], pose[3] = placed.rotation, placed.translation
         return made
 
     def touching(self, configurations, within=0.0):
@@ -85,7 +86,7 @@ class Robot:
         return (errors[-1] + errors[-2]) * (1 + 1e-5) + 1e-9
 
     def of_scene(self, scene, poses, within=0.0):
-        return scene.configurations(np.arange(len(self.links)), transform=poses, within=within).touching
+        return scene.configurations(np.arange(len(self.links)), pose=poses, within=within).touching
 
     def random(self, rng, count, spread=1.0):
         """Random configurations, whose joints are within a part of their range about that at rest."""
@@ -152,7 +153,7 @@ def main():
     if "--picture" in sys.argv and found is not None:
         shown = robot.poses(found[:: max(1, len(found) // 4)])
         links = np.arange(len(robot.links))
-        bodies = [tandem.instances(asset=links, transform=transforms) for transforms in shown] + [robot.scene.instances()[len(links):]]
+        bodies = [tandem.instances(asset=links, rotation=poses[:, :3], translation=poses[:, 3]) for poses in shown] + [robot.scene.instances()[len(links):]]
         tandem.view(robot.assets, np.concatenate(bodies), picture="plan_robot.png", size=(640, 400), azimuth=-40, elevation=25)
 
 

@@ -86,9 +86,7 @@ TANDEM_INLINE void store_rows(const Lanes4& rows, int k, float (&to)[3][kNodesPe
 constexpr int kRefitLanes = 16;
 
 TANDEM_INLINE void load_rows(const float (&of)[3][kNodesPerBlock], int, Lanes<16>& rows) {
-  const __m512 two_rows = _mm512_zextps256_ps512(_mm256_loadu_ps(of[0]));
-  rows.v =
-      reinterpret_cast<Lanes<16>::Floats>(_mm512_maskz_insertf32x4(0xFFFF, two_rows, _mm_loadu_ps(of[2]), 2));
+  rows.v = reinterpret_cast<Lanes<16>::Floats>(_mm512_maskz_loadu_ps(0x0FFF, &of[0][0]));
 }
 
 TANDEM_INLINE void store_rows(const Lanes<16>& rows, int, float (&to)[3][kNodesPerBlock]) {

@@ -35,6 +35,8 @@ __all__ = ["Incomplete", "Library", "build", "check", "contacts"]
 
 #: Tasks for each thread of the workers: enough that those that have longer ones end at about the same time.
 _TASKS_PER_THREAD = 8
+#: Meshes of large files take longer, so that there are more tasks of them; but none is of fewer bytes than are worth a task.
+_LARGE_TASKS_PER_THREAD = 32
 _MOST_MESHES_PER_TASK, _MESH_BYTES_PER_TASK = 64, 1 << 20
 _POSE_BYTES_PER_TASK = 1 << 23
 #: Seconds without an answer after which the connection is looked at.
@@ -224,7 +226,7 @@ def _planned(client: Any, paths: list[str], folder: str, options: jobs.BuildOpti
 
 def _of_each_mesh(client: Any, name: str, function: Callable[..., Any], paths: list[str], *rest: Any) -> Iterator[tuple[str, Any]]:
     """Runs function(paths, *rest), which returns a list, on batches of paths. Yields each path once, with its entry or a _Lost."""
-    batches = list(_batches(paths, -(-len(paths) // _task_count(client))))
+    batches = list(_batches(paths, _task_count(client)))
     alone = []
     for number, outcome in _outcomes(client, name, function, [(batch, *rest) for batch in batches]):
         if isinstance(outcome, _Lost) and outcome.worker_died:
@@ -236,17 +238,27 @@ def _of_each_mesh(client: Any, name: str, function: Callable[..., Any], paths: l
             yield path, outcome if isinstance(outcome, _Lost) else outcome[0]
 
 
-def _batches(paths: list[str], most: int) -> Iterator[list[str]]:
-    """Cuts paths into runs that are worth a task each."""
+def _bytes_of(path: str) -> int:
+    try:
+        return os.path.getsize(path)
+    except OSError:  # where the caller does not see it
+        return _MESH_BYTES_PER_TASK
+
+
+def _batches(paths: list[str], tasks: int) -> Iterator[list[str]]:
+    """Cuts paths into batches that are worth a task each. Those of the largest files come first, so that no worker has a long one left when the others are done.
+
+    tasks: how many there should be at least, where the files are small.
+    """
+    sizes = {path: _bytes_of(path) for path in paths}
+    enough = max(_MESH_BYTES_PER_TASK, sum(sizes.values()) * _TASKS_PER_THREAD // (tasks * _LARGE_TASKS_PER_THREAD))
+    most = min(-(-len(paths) // tasks), _MOST_MESHES_PER_TASK)
     batch: list[str] = []
     size = 0
-    for path in paths:
-        try:
-            size += os.path.getsize(path)
-        except OSError:  # where the caller does not see it
-            size += _MESH_BYTES_PER_TASK
+    for path in sorted(paths, key=lambda path: -sizes[path]):
+        size += sizes[path]
         batch.append(path)
-        if size >= _MESH_BYTES_PER_TASK or len(batch) >= min(most, _MOST_MESHES_PER_TASK):
+        if size >= enough or len(batch) >= most:
             yield batch
             batch, size = [], 0
     if batch:

@@ -78,9 +78,10 @@ def test_an_asset_says_how_many_positions_it_wants(box, scene):
             scene.deform(0, wrong)
     broken = BOX_VERTICES.astype(np.float32)
     broken[5, 1] = np.nan
-    with pytest.raises(tandem.Error) as raised:
-        scene.deform(0, broken)
-    assert raised.value.where == 5
+    for kind in (np.float32, np.float64):
+        with pytest.raises(tandem.Error, match="vertex 5: .*positions of asset 1") as raised:
+            scene.deform(1, broken.astype(kind))
+        assert (raised.value.subject, raised.value.where) == ("vertex", 5)
     assert len(scene.contacts().contacts) == 0
 
 

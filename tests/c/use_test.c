@@ -368,6 +368,18 @@ static void test_deforming(void) {
   tandem_asset* assets[2];
   CHECK_STATUS(tandem_asset_build(&mesh, NULL, NULL, &assets[0], NULL), TANDEM_OK);
   assets[1] = assets[0];
+  // A tree for two more shapes.
+  double poses[] = {0, 0, 0, 1, 0, 0, 1, 1, 2, 0, 1, 0, 0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 5};
+  tandem_mesh moving = mesh;
+  moving.poses = poses;
+  moving.pose_count = 2;
+  tandem_asset* moved = NULL;
+  CHECK_STATUS(tandem_asset_build(&moving, NULL, NULL, &moved, NULL), TANDEM_OK);
+  tandem_asset_release(moved);
+  poses[23] = NAN;
+  CHECK_STATUS(tandem_asset_build(&moving, NULL, NULL, &moved, NULL), TANDEM_OUT_OF_RANGE);
+  moving.poses = NULL;
+  CHECK_STATUS(tandem_asset_build(&moving, NULL, NULL, &moved, NULL), TANDEM_NULL_ARGUMENT);
   tandem_asset_info info = {.struct_size = sizeof info};
   CHECK_STATUS(tandem_asset_get_info(assets[0], &info), TANDEM_OK);
   CHECK(info.source_vertices == 4);

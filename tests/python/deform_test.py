@@ -78,9 +78,10 @@ def test_an_asset_says_how_many_positions_it_wants(box, scene):
             scene.deform(0, wrong)
     broken = BOX_VERTICES.astype(np.float32)
     broken[5, 1] = np.nan
-    with pytest.raises(tandem.Error) as raised:
-        scene.deform(0, broken)
-    assert raised.value.where == 5
+    for kind in (np.float32, np.float64):
+        with pytest.raises(tandem.Error, match="vertex 5: .*positions of asset 1") as raised:
+            scene.deform(1, broken.astype(kind))
+        assert (raised.value.subject, raised.value.where) == ("vertex", 5)
     assert len(scene.contacts().contacts) == 0
 
 
@@ -106,3 +107,31 @@ def test_looseness_tells_a_tree_that_no_longer_fits():
     assert scene.looseness(0) == pytest.approx(1, abs=1e-4)
     scene.deform(0, (corners + numbers.random((500, 1, 3))).reshape(-1, 3).astype(np.float32))
     assert scene.looseness(0) > 2
+
+
+def test_a_tree_for_poses_fits_them_better():
+    numbers = np.random.default_rng(3)
+    corners = 0.01 * numbers.random((500, 3, 3))
+    places = numbers.random((2, 500, 1, 3))
+    at_rest, pose = (corners + places).reshape(2, 1500, 3).astype(np.float32)
+    faces = np.arange(1500).reshape(500, 3)
+    assert tandem.build(at_rest, faces, poses=[]).hash == tandem.build(at_rest, faces).hash
+    pairs = []
+    for poses in (None, [pose], pose):
+        scene = tandem.Scene([tandem.build(at_rest, faces, poses=poses)] * 2, asset=[0, 1], translation=[[0, 0, 0], [0.01, 0, 0]])
+        for asset in range(2):
+            scene.deform(asset, pose)
+        pairs.append(scene.contacts().counters.block_pairs)
+    assert pairs[1] == pairs[2] < 0.8 * pairs[0]
+
+
+def test_poses_that_do_not_fit_are_refused():
+    broken = np.stack([BOX_VERTICES.astype(float)] * 2)
+    for bad in (np.nan, np.inf, 3.5e38):
+        broken[1, 5, 2] = bad
+        with pytest.raises(ValueError, match="vertex 5 of pose 1"):
+            tandem.build(BOX_VERTICES, BOX_FACES, poses=broken)
+    with pytest.raises(ValueError, match="poses has shape"):
+        tandem.build(BOX_VERTICES, BOX_FACES, poses=[BOX_VERTICES[:-1]])
+    with pytest.raises(ValueError, match="without levels"):
+        tandem.build(BOX_VERTICES, BOX_FACES, poses=[BOX_VERTICES], levels="auto")

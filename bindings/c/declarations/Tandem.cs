@@ -48,6 +48,8 @@ public unsafe struct tandem_mesh {
   public uint* faces;
   public tandem_mesh_part* parts;
   public UIntPtr part_count;
+  public double* poses;
+  public UIntPtr pose_count;
 }
 
 [StructLayout(LayoutKind.Sequential)]

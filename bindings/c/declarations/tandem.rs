@@ -230,6 +230,8 @@ pub struct tandem_mesh {
     pub faces: *const u32,
     pub parts: *const tandem_mesh_part,
     pub part_count: usize,
+    pub poses: *const f64,
+    pub pose_count: usize,
 }
 
 #[repr(C)]

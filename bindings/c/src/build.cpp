@@ -1,9 +1,11 @@
 #include <algorithm>
+#include <cmath>
 #include <new>
 #include <vector>
 
 #include "handles.h"
 #include "tandem/build/build_asset.h"
+#include "tandem/formats/box.h"
 
 using namespace tandem;
 using namespace tandem::c;
@@ -13,24 +15,37 @@ namespace {
 // A mesh as the builder takes it.
 struct Source {
   std::vector<build::SourcePart> parts;
+  std::vector<std::vector<build::Point>> poses;
   build::TriangleSource triangles;
 };
 
 static_assert(sizeof(build::Point) == 3 * sizeof(double) &&
               sizeof(build::TriangleIndices) == 3 * sizeof(uint32_t));
 
+tandem_status read_poses(const tandem_mesh& mesh, Source& source) {
+  const std::size_t points = mesh.pose_count * mesh.vertex_count;
+  const auto in_range = [](double x) { return std::fabs(x) <= static_cast<double>(kMaxCoordinate); };
+  if (!std::all_of(mesh.poses, mesh.poses + 3 * points, in_range)) return TANDEM_OUT_OF_RANGE;
+  const auto* const first = reinterpret_cast<const build::Point*>(mesh.poses);
+  for (std::size_t i = 0; i < mesh.pose_count; ++i)
+    source.poses.emplace_back(first + i * mesh.vertex_count, first + (i + 1) * mesh.vertex_count);
+  source.triangles.poses = source.poses;
+  return TANDEM_OK;
+}
+
 tandem_status read_mesh(const tandem_mesh& given, Source& source) {
   tandem_mesh mesh;
   if (const tandem_status status = read_struct(&given, mesh); status != TANDEM_OK) return status;
   if (mesh.reserved != 0) return TANDEM_BAD_OPTION;
   if (!is_there(mesh.positions, mesh.vertex_count) || !is_there(mesh.triangles, mesh.triangle_count) ||
-      !is_there(mesh.parts, mesh.part_count))
+      !is_there(mesh.parts, mesh.part_count) || !is_there(mesh.poses, mesh.pose_count))
     return TANDEM_NULL_ARGUMENT;
   if (mesh.triangle_count >= kNoIndex) return TANDEM_TOO_MANY_TRIANGLES;
   build::TriangleSource& to = source.triangles;
   to.points = {reinterpret_cast<const build::Point*>(mesh.positions), mesh.vertex_count};
   to.triangles = {reinterpret_cast<const build::TriangleIndices*>(mesh.triangles), mesh.triangle_count};
   if (mesh.faces != nullptr) to.face = {mesh.faces, mesh.triangle_count};
+  if (const tandem_status status = read_poses(mesh, source); status != TANDEM_OK) return status;
   uint64_t faces = mesh.triangle_count;
   if (!to.face.empty()) faces = uint64_t{*std::max_element(to.face.begin(), to.face.end())} + 1;
   if (faces >= kNoIndex) return TANDEM_TOO_MANY_TRIANGLES;

@@ -29,11 +29,14 @@ nb::tuple to_tuple(const tandem_build_report& of) {
                         of.duplicate_reversed, of.flattened, of.vertices_unreferenced, of.vertices_welded);
 }
 
-// Positions and triangles by rows; faces of triangles or None; names, paths and counts of faces of parts.
-nb::tuple build(nb::handle positions, nb::handle triangles, nb::handle faces, const std::vector<Part>& parts,
-                std::uint32_t effort, bool gpu_blocks, bool topology, bool refit, std::uint32_t threads,
-                double imaginary_share, const nb::object& provenance, nb::handle progress) {
+// Positions, in `poses` of one pose after the other, and triangles by rows; faces of triangles or None;
+// names, paths and counts of faces of parts.
+nb::tuple build(nb::handle positions, nb::handle poses, nb::handle triangles, nb::handle faces,
+                const std::vector<Part>& parts, std::uint32_t effort, bool gpu_blocks, bool topology,
+                bool refit, std::uint32_t threads, double imaginary_share, const nb::object& provenance,
+                nb::handle progress) {
   const auto points = copy_rows<double>(positions);
+  const auto posed_points = copy_rows<double>(poses);
   const auto corners = copy_rows<std::uint32_t>(triangles);
   std::vector<std::uint32_t> face_of;
   if (!faces.is_none()) face_of = copy_rows<std::uint32_t>(faces);
@@ -43,6 +46,8 @@ nb::tuple build(nb::handle positions, nb::handle triangles, nb::handle faces, co
   auto mesh = sized<tandem_mesh>();
   mesh.positions = points.data();
   mesh.vertex_count = points.size() / 3;
+  mesh.poses = posed_points.data();
+  mesh.pose_count = points.empty() ? 0 : posed_points.size() / points.size();
   mesh.triangles = corners.data();
   mesh.triangle_count = corners.size() / 3;
   mesh.faces = faces.is_none() ? nullptr : face_of.data();
@@ -76,8 +81,8 @@ nb::tuple build(nb::handle positions, nb::handle triangles, nb::handle faces, co
 }  // namespace
 
 void add_builder(nb::module_& module) {
-  module.def("build", build, nb::arg(), nb::arg(), nb::arg().none(), nb::arg(), nb::arg(), nb::arg(),
-             nb::arg(), nb::arg(), nb::arg(), nb::arg(), nb::arg().none(), nb::arg().none());
+  module.def("build", build, nb::arg(), nb::arg(), nb::arg(), nb::arg().none(), nb::arg(), nb::arg(),
+             nb::arg(), nb::arg(), nb::arg(), nb::arg(), nb::arg(), nb::arg().none(), nb::arg().none());
 }
 
 }  // namespace tandem::python

@@ -1,6 +1,7 @@
 #include "core.h"
 
 #include <stdexcept>
+#include <string>
 
 namespace tandem::python {
 
@@ -16,6 +17,12 @@ void throw_status(tandem_status status, const char* sentence, const char* subjec
           .attr("from_status")(status, tandem_status_name(status), sentence, counted, where);
   PyErr_SetObject(error.type().ptr(), error.ptr());
   throw nb::python_error();
+}
+
+void throw_vertex(tandem_status status, std::uint32_t asset, std::uint64_t vertex) {
+  const std::string sentence =
+      std::string(tandem_status_explain(status)) + " (positions of asset " + std::to_string(asset) + ")";
+  throw_status(status, sentence.c_str(), "vertex", vertex);
 }
 
 void* bytes_begin(nb::handle bytearray) {

@@ -24,6 +24,9 @@ void check(tandem_status status, std::uint64_t where = 0);
 [[noreturn]] void throw_status(tandem_status status, const char* sentence, const char* subject,
                                std::uint64_t where);
 
+/// Throws the exception of a status that blames a vertex among the positions of an asset.
+[[noreturn]] void throw_vertex(tandem_status status, std::uint32_t asset, std::uint64_t vertex);
+
 /// An options struct of the C interface with its size, and zeros.
 template <typename Options>
 Options sized() {

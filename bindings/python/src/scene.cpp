@@ -45,7 +45,17 @@ class Scene {
   // positions: contiguous, float32 or float64.
   void deform(std::uint32_t asset, nb::handle positions, bool in_float64) {
     const auto of = [&](auto function, const auto& numbers) {
-      change([&](tandem_scene* scene) { return function(scene, asset, numbers.data(), numbers.size() / 3); });
+      const Turn turn = take_turn();
+      contacts_asked_ = false;
+      const std::size_t count = numbers.size() / 3;
+      const tandem_status status =
+          status_of([&](tandem_scene* scene) { return function(scene, asset, numbers.data(), count); });
+      const std::uint64_t where = tandem_scene_where(scene_.get());
+      const bool is_of_positions = status == TANDEM_OUT_OF_RANGE || status == TANDEM_NOT_FLOAT32;
+      if (is_of_positions && where < count) throw_vertex(status, asset, where);
+      if (is_of_positions)
+        throw_status(status, "a body reaches too far with these positions of its asset", "asset", asset);
+      if (status != TANDEM_OK) check(status, where);
     };
     if (in_float64)
       of(tandem_scene_deform_f64, copy_rows<double>(positions));
@@ -270,13 +280,15 @@ class Scene {
 
   // Makes a call of the C interface without the interpreter's lock.
   template <typename Call>
+  tandem_status status_of(const Call& call) {
+    const WithoutLock other_threads_run;
+    return call(scene_.get());
+  }
+
+  template <typename Call>
   void ask(const Call& call) {
-    tandem_scene* const scene = scene_.get();
-    const tandem_status status = [&] {
-      const WithoutLock other_threads_run;
-      return call(scene);
-    }();
-    if (status != TANDEM_OK) check(status, tandem_scene_where(scene));
+    if (const tandem_status status = status_of(call); status != TANDEM_OK)
+      check(status, tandem_scene_where(scene_.get()));
   }
 
   // Asks a question; its rows.

@@ -18,6 +18,8 @@ from ._errors import Error, FileError, with_path
 
 __all__ = ["BuildReport", "Mesh", "build", "read_mesh"]
 
+_MOST_COORDINATE = float.fromhex("0x1.fffp127")  # kMaxCoordinate of the builder
+
 
 class BuildReport(NamedTuple):
     """Counts what became of the triangles."""
@@ -74,18 +76,18 @@ Progress = Callable[[float], object]
 
 @overload
 def build(vertices: Vertices, faces: Faces = ..., *, effort: Effort = ..., levels: Levels | None = ..., threads: int = ...,
-          gpu_blocks: bool = ..., topology: bool = ..., refit: bool = ..., imaginary_share: float = ..., face_ids: npt.ArrayLike | None = ..., parts: Parts | None = ...,
+          gpu_blocks: bool = ..., topology: bool = ..., refit: bool = ..., imaginary_share: float = ..., face_ids: npt.ArrayLike | None = ..., parts: Parts | None = ..., poses: npt.ArrayLike | None = ...,
           provenance: str | None = ..., progress: Progress | None = ..., return_report: Literal[False] = ...) -> Asset: ...
 
 
 @overload
 def build(vertices: Vertices, faces: Faces = ..., *, effort: Effort = ..., levels: Levels | None = ..., threads: int = ...,
-          gpu_blocks: bool = ..., topology: bool = ..., refit: bool = ..., imaginary_share: float = ..., face_ids: npt.ArrayLike | None = ..., parts: Parts | None = ...,
+          gpu_blocks: bool = ..., topology: bool = ..., refit: bool = ..., imaginary_share: float = ..., face_ids: npt.ArrayLike | None = ..., parts: Parts | None = ..., poses: npt.ArrayLike | None = ...,
           provenance: str | None = ..., progress: Progress | None = ..., return_report: Literal[True]) -> tuple[Asset, BuildReport]: ...
 
 
 def build(vertices: Vertices, faces: Faces = None, *, effort: Effort = "default", levels: Levels | None = None, threads: int = 0,
-          gpu_blocks: bool = True, topology: bool = True, refit: bool = True, imaginary_share: float = 0.0, face_ids: npt.ArrayLike | None = None, parts: Parts | None = None,
+          gpu_blocks: bool = True, topology: bool = True, refit: bool = True, imaginary_share: float = 0.0, face_ids: npt.ArrayLike | None = None, parts: Parts | None = None, poses: npt.ArrayLike | None = None,
           provenance: str | None = None, progress: Progress | None = None, return_report: bool = False) -> Asset | tuple[Asset, BuildReport]:
     """Builds an asset: the bytes that bvhbuild writes for these faces, but for what they say of their making.
 
@@ -102,6 +104,8 @@ def build(vertices: Vertices, faces: Faces = None, *, effort: Effort = "default"
         imaginary_share: padding nodes: 0, the proven fewest, to 1, as many as a free tree has.
         face_ids: (m,), the face of the caller's mesh that each one is a piece of; its own number where not given.
         parts: of each run of faces with a name: name, path and number of faces, or what `read_mesh` says.
+        poses: (k, n, 3), the vertices in k other shapes that the mesh takes: the tree is made for the mean over all of them, for `Scene.deform`. Triangles alone,
+            without levels.
         provenance: JSON that the file says of its making.
         progress: called now and then, in this thread, with the share of the optimisation that is done; effort "fast" has none. What it raises ends the build
             before the next step, as Ctrl-C does: within seconds for a million triangles.
@@ -130,6 +134,9 @@ def build(vertices: Vertices, faces: Faces = None, *, effort: Effort = "default"
     ids = None if face_ids is None else whole_numbers(face_ids, "face_ids", 0xFFFFFFFD)
     if ids is not None and ids.shape != (count,):
         raise ValueError(f"face_ids has shape {ids.shape} where ({count},) is wanted")
+    posed = _poses(poses, len(points))
+    if len(posed) and (levels is not None or face_begin is not None):
+        raise ValueError("poses are for triangles without levels")
     share = number(imaginary_share, "imaginary_share")
     if not 0 <= share <= 1:
         raise ValueError(f"imaginary_share is {share} where 0 to 1 is wanted")
@@ -143,7 +150,7 @@ def build(vertices: Vertices, faces: Faces = None, *, effort: Effort = "default"
     reported = flag(return_report, "return_report")
     strength = _choice("effort", effort, ("default", "fast", "best"))
     if levels is None and face_begin is None:
-        core, report = _tandem.build(points, corners, ids, named, strength, gpu, topological, bends, workers, share, provenance, progress)
+        core, report = _tandem.build(points, posed, corners, ids, named, strength, gpu, topological, bends, workers, share, provenance, progress)
         asset = Asset._of(core)
     else:
         if face_begin is None:
@@ -197,6 +204,18 @@ def read_mesh(path: str | os.PathLike[str], *, outside_files: bool = False) -> M
                 np.frombuffer(bytearray(faces), np.uint32), [Part(name.decode(errors="replace"), path.decode(errors="replace"), first, count)
                                                              for name, path, first, count in parts],
                 [remark.decode(errors="replace") for remark in remarks])
+
+
+def _poses(poses: npt.ArrayLike | None, vertex_count: int) -> npt.NDArray[np.float64]:
+    """Poses of a mesh with so many vertices, checked; (0, n, 3) where there are none."""
+    if poses is None or vertex_count == 0:
+        return np.empty((0, vertex_count, 3))
+    posed = floats(poses, "poses", vertex_count, 3).reshape(-1, vertex_count, 3)
+    bad = ~(np.abs(posed) <= _MOST_COORDINATE)
+    if bad.any():
+        pose, vertex, _ = np.argwhere(bad)[0]
+        raise ValueError(f"poses: vertex {vertex} of pose {pose} is not finite or too large")
+    return posed
 
 
 def _polygons(faces: Any, vertex_count: int) -> tuple[npt.NDArray[np.uint32], npt.NDArray[np.uint32] | None]:

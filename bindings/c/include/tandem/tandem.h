@@ -192,6 +192,10 @@ typedef struct tandem_mesh {
   const uint32_t* faces;          ///< of each triangle: the face that it is a piece of; null: its own number
   const tandem_mesh_part* parts;  ///< that the faces are in, one after the other; null: one without a name
   size_t part_count;              ///< the parts' faces together are more than each of `faces`
+  /// Null, or where the vertices are in other shapes that the mesh takes, one shape after the other, each as
+  /// `positions`. The tree is then made for the mean over all of them, for tandem_scene_deform().
+  const double* poses;
+  size_t pose_count;
 } tandem_mesh;
 
 enum { TANDEM_EFFORT_DEFAULT = 0, TANDEM_EFFORT_FAST = 1, TANDEM_EFFORT_BEST = 2 };
@@ -229,7 +233,8 @@ typedef struct tandem_build_report {
 /// but for the provenance, and the same whatever the threads. report: or null; filled also where no triangle
 /// can be used. The bytes come from the allocator; what building takes meanwhile, from the C++ runtime.
 /// Result: TANDEM_NO_TRIANGLE; TANDEM_TOO_MANY_TRIANGLES, also where one of `faces` is 2^32 - 2 or more;
-/// TANDEM_BAD_PART where faces lie in no part, or the parts have 2^32 - 1 faces or more.
+/// TANDEM_BAD_PART where faces lie in no part, or the parts have 2^32 - 1 faces or more; TANDEM_OUT_OF_RANGE
+/// where a coordinate of `poses` is NaN or beyond 3.4e38.
 TANDEM_API tandem_status tandem_asset_build(const tandem_mesh* mesh, const tandem_build_options* options,
                                             const tandem_allocator* allocator, tandem_asset** asset,
                                             tandem_build_report* report);

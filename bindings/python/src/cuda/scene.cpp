@@ -67,9 +67,7 @@ void Assets::check_report(tandem_status status) const {
   tandem_gpu_deform_report report;
   if (status == TANDEM_OK || tandem_gpu_assets_get_report(assets_, &report) != status)
     return check_whole(status);
-  const std::string sentence = std::string(tandem_status_explain(status)) + " (positions of asset " +
-                               std::to_string(deforming_[report.body]) + ")";
-  throw_status(status, sentence.c_str(), "vertex", report.where);
+  throw_vertex(status, deforming_[report.body], report.where);
 }
 
 void Assets::deform(const Positions& positions, const Stream& stream) const {

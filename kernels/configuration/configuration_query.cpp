@@ -71,7 +71,18 @@ struct ConfigurationQuery::State : Allocated {
     Buffer<ConfigurationPair> found;
     ConfigurationCounters counters;
     bool enough_memory = true;
+
+    void begin(std::size_t moving) {
+      found.clear();
+      counters = {};
+      enough_memory = trees.resize(moving) && boxes.resize(moving);
+      first_contact.begin();
+      search.reset_counters();
+    }
   };
+
+  Status check(SceneState& scene, const ConfigurationOptions& options);
+  Status walk(SceneState& scene, const ConfigurationOptions& options, std::size_t count);
 
   bool stands_as_before(const SceneState& scene, std::span<const std::uint32_t> bodies) const;
   Status prepare(const SceneState& scene, const ConfigurationOptions& options);
@@ -279,56 +290,66 @@ void ConfigurationQuery::State::work(const SceneState& scene, const Configuratio
   decide(options, configuration, worker);
 }
 
-Status ConfigurationQuery::answer(SceneState& scene, const ConfigurationOptions& options) {
+Status ConfigurationQuery::State::check(SceneState& scene, const ConfigurationOptions& options) {
   const std::size_t moving = options.bodies.size();
-  State* const state = state_.provide();
-  if (state == nullptr) return scene.fail(Status::kOutOfMemory, 0);
-  const Status sound = options.find == ConfigurationPairs::nearest
-                           ? check_distance_options(options.tolerance, options.within)
-                           : check_within(options.within);
-  if (sound != Status::kOk) return scene.fail(sound, 0);
-  if (const Status status = state->check_bodies(scene, options.bodies); status != Status::kOk) return status;
+  Status status = options.find == ConfigurationPairs::nearest
+                      ? check_distance_options(options.tolerance, options.within)
+                      : check_within(options.within);
+  if (status != Status::kOk) return scene.fail(status, 0);
+  status = check_bodies(scene, options.bodies);
+  if (status != Status::kOk) return status;
   if (moving == 0 ? !options.poses.empty() : options.poses.size() % moving != 0)
     return scene.fail(Status::kMotionMismatch, options.poses.size());
-  const std::size_t count = moving == 0 ? 0 : options.poses.size() / moving;
-  const bool by_device = scene.device != nullptr;
-  const Status prepared = by_device ? Status::kOk : state->prepare(scene, options);
-  if (prepared != Status::kOk) return scene.fail(prepared, 0);
+  return Status::kOk;
+}
 
-  const std::uint32_t workers = scene.workers_for(count, kConfigurationsAtOnce);
-  if (!scene.threads.provide(workers)) return scene.fail(Status::kCannotStartThread, 0);
-  if (!state->workers.provide(workers)) return scene.fail(Status::kOutOfMemory, 0);
-  for (std::uint32_t i = 0; i < workers; ++i) {
-    State::Worker& worker = state->workers[i];
-    worker.found.clear();
-    worker.counters = {};
-    worker.enough_memory = worker.trees.resize(moving) && worker.boxes.resize(moving);
-    worker.first_contact.begin();
-    worker.search.reset_counters();
-  }
-  state->first_refused = options.poses.size();
-  scene.threads.for_parts(workers, count, kConfigurationsAtOnce,
-                          [&](std::size_t i, std::size_t end, std::uint32_t worker) {
-                            for (; i < end && state->workers[worker].enough_memory; ++i) {
-                              const bool in_range = state->pose(scene, options, i, state->workers[worker]);
-                              if (in_range && !by_device)
-                                state->work(scene, options, i, state->workers[worker]);
+// Poses the bodies in all configurations, and where the CPU answers finds what is asked for.
+Status ConfigurationQuery::State::walk(SceneState& scene, const ConfigurationOptions& options,
+                                       std::size_t count) {
+  const std::size_t moving = options.bodies.size();
+  const std::uint32_t used = scene.workers_for(count, kConfigurationsAtOnce);
+  if (!scene.threads.provide(used)) return scene.fail(Status::kCannotStartThread, 0);
+  if (!workers.provide(used)) return scene.fail(Status::kOutOfMemory, 0);
+  for (std::size_t i = 0; i < workers.size(); ++i) workers[i].begin(moving);
+  first_refused = options.poses.size();
+  scene.threads.for_parts(used, count, kConfigurationsAtOnce,
+                          [&](std::size_t i, std::size_t end, std::uint32_t number) {
+                            Worker& worker = workers[number];
+                            for (; i < end && worker.enough_memory; ++i) {
+                              const bool in_range = pose(scene, options, i, worker);
+                              if (in_range && scene.device == nullptr) work(scene, options, i, worker);
                             }
                           });
-  if (const std::size_t refused = state->first_refused; refused != options.poses.size()) {
-    PosedTree tree;
-    WorldBox box;
-    const std::uint32_t body = options.bodies[refused % moving];
-    return scene.fail(scene.posed({scene.instances[body].asset, options.poses[refused]}, tree, box), refused);
+  for (std::size_t i = 0; i < workers.size(); ++i) {
+    if (!workers[i].enough_memory) return scene.fail(Status::kOutOfMemory, 0);
   }
+  const std::size_t refused = first_refused;
+  if (refused == options.poses.size()) return Status::kOk;
+  PosedTree tree;
+  WorldBox box;
+  const std::uint32_t body = options.bodies[refused % moving];
+  return scene.fail(scene.posed({scene.instances[body].asset, options.poses[refused]}, tree, box), refused);
+}
+
+Status ConfigurationQuery::answer(SceneState& scene, const ConfigurationOptions& options) {
+  State* const state = state_.provide();
+  if (state == nullptr) return scene.fail(Status::kOutOfMemory, 0);
+  Status status = state->check(scene, options);
+  if (status != Status::kOk) return status;
+  const bool by_device = scene.device != nullptr;
+  if (!by_device) status = state->prepare(scene, options);
+  if (status != Status::kOk) return scene.fail(status, 0);
+  const std::size_t count = options.bodies.empty() ? 0 : options.poses.size() / options.bodies.size();
+  status = state->walk(scene, options, count);
+  if (status != Status::kOk) return status;
   rows_.clear();
   counters_ = {count, 0, 0, 0};
   if (by_device) return state->worlds.find(scene, options, state->moves.view(), rows_, counters_);
-  for (std::uint32_t i = 0; i < workers; ++i) {
+  for (std::size_t i = 0; i < state->workers.size(); ++i) {
     State::Worker& worker = state->workers[i];
-    bool enough_memory = worker.enough_memory;
-    for (const ConfigurationPair& row : worker.found.view()) enough_memory = enough_memory && rows_.push(row);
-    if (!enough_memory) return scene.fail(Status::kOutOfMemory, 0);
+    for (const ConfigurationPair& row : worker.found.view()) {
+      if (!rows_.push(row)) return scene.fail(Status::kOutOfMemory, 0);
+    }
     worker.counters.block_pairs =
         worker.first_contact.block_pairs() + worker.search.found.counters.block_pairs;
     add_to(counters_, worker.counters,

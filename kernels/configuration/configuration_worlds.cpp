@@ -25,7 +25,8 @@ bool ConfigurationWorlds::place(const SceneState& scene, const ConfigurationOpti
   Buffer<Motion>& motion = worlds_.columns.motion;
   Buffer<std::uint32_t>& world = worlds_.columns.world;
   fixed_kept_ = fixed_kept_ && worlds_.instances.size() == all;
-  if (!worlds_.instances.resize(all) || !worlds_.bodies.resize(all) || !motion.resize(all) || !world.resize(all))
+  if (!worlds_.instances.resize(all) || !worlds_.bodies.resize(all) || !motion.resize(all) ||
+      !world.resize(all))
     return false;
   for (std::size_t i = 0; i < moving; ++i) {
     worlds_.instances[i] = {scene.instances[options.bodies[i % n]].asset, options.poses[slice.first * n + i]};
@@ -87,8 +88,9 @@ Status ConfigurationWorlds::decide(SceneState& scene, const ConfigurationOptions
   return Status::kOk;
 }
 
-Status ConfigurationWorlds::measure(SceneState& scene, const ConfigurationOptions& options, const Slice& slice,
-                                    Buffer<ConfigurationPair>& rows, ConfigurationCounters& counters) {
+Status ConfigurationWorlds::measure(SceneState& scene, const ConfigurationOptions& options,
+                                    const Slice& slice, Buffer<ConfigurationPair>& rows,
+                                    ConfigurationCounters& counters) {
   const DistanceOptions asked = {.tolerance = options.tolerance, .reach = options.within};
   const Status status =
       scene.device->find(worlds_, asked, {pairs_, distances_, distance_counters_, distance_memory_});
@@ -138,7 +140,6 @@ Status ConfigurationWorlds::find(SceneState& scene, const ConfigurationOptions& 
                      : decide(scene, options, slice, rows, counters);
     if (status != Status::kOk) return status;
   }
-  counters.configurations = count;
   return Status::kOk;
 }
 

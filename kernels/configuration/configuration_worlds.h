@@ -9,8 +9,9 @@
 
 namespace tandem {
 
-/// Answers a question about configurations on the device of a scene: each configuration is a world with bodies
-/// of its own, what stands is in all worlds, and one question is about as many worlds as there is room for.
+/// Answers a question about configurations on the device of a scene: each configuration is a world with
+/// bodies of its own, what stands is in all worlds, and one question is about as many worlds as there is room
+/// for.
 class ConfigurationWorlds {
  public:
   /// moves: of each body of the scene, 0 where it stands. Result: kOk, or what the device says.
@@ -25,7 +26,8 @@ class ConfigurationWorlds {
 
   bool place(const SceneState& scene, const ConfigurationOptions& options, const Slice& slice);
   void keep_asked(const SceneState& scene, const ConfigurationOptions& options, const Slice& slice);
-  ConfigurationPair row_of(const ConfigurationOptions& options, const Slice& slice, const ObjectPair& pair) const;
+  ConfigurationPair row_of(const ConfigurationOptions& options, const Slice& slice,
+                           const ObjectPair& pair) const;
   Status decide(SceneState& scene, const ConfigurationOptions& options, const Slice& slice,
                 Buffer<ConfigurationPair>& rows, ConfigurationCounters& counters);
   Status measure(SceneState& scene, const ConfigurationOptions& options, const Slice& slice,

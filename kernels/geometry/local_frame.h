@@ -4,8 +4,8 @@
 
 #include "kernels/geometry/box_distance.h"
 #include "kernels/geometry/ray_triangle.h"
-#include "kernels/geometry/wide_integer.h"
 #include "kernels/geometry/relative_pose.h"
+#include "kernels/geometry/wide_integer.h"
 #include "tandem/kernels/world_box.h"
 
 /// Points and rays of the world in the frame of a body's stored coordinates, in which float32 walks its tree;

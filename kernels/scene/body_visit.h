@@ -45,7 +45,8 @@ class BodyVisit {
 
   // Pushes what is in a group, the nearest last.
   template <typename Bound>
-  TANDEM_HD void push_group(const BoxTree::Group& group, const Entry& entry, const Bound& bound, double limit) {
+  TANDEM_HD void push_group(const BoxTree::Group& group, const Entry& entry, const Bound& bound,
+                            double limit) {
     const int bottom = height_;
     for (int i = 0; i < BoxTree::kGroup; ++i) {
       WorldBox box;

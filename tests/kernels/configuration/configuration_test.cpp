@@ -33,6 +33,13 @@ class CpuDevice final : public SceneDevice {
   }
 
   Status deform(SceneState&, std::uint32_t, std::span<const float>) override { return Status::kBadOption; }
+  Status find(SceneState&, const ClosestOptions&,
+              const DeviceAnswer<ClosestPoint, ClosestCounters>&) override {
+    return Status::kBadOption;
+  }
+  Status find(SceneState&, const RayOptions&, const DeviceAnswer<RayHit, RayCounters>&) override {
+    return Status::kBadOption;
+  }
   Status find(SceneState&, const ToleranceOptions&,
               const DeviceAnswer<PairVerdict, ToleranceCounters>&) override {
     return Status::kBadOption;

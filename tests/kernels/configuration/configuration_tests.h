@@ -10,8 +10,8 @@
 #include "tandem/kernels/configuration_query.h"
 #include "tandem/kernels/distance_query.h"
 
-/// Configurations of a scene, on whatever device: what is found is what a scene on the CPU finds whose bodies are
-/// moved.
+/// Configurations of a scene, on whatever device: what is found is what a scene on the CPU finds whose bodies
+/// are moved.
 namespace tandem {
 
 using test::any_rotation;

@@ -12,7 +12,7 @@ SceneDevice* gpu_scene_device();
 /// wants rows in GPU memory asks GpuContactQuery and the others, which take arrays there.
 ///
 /// Contacts, manifolds, contained bodies and verdicts are those of the CPU, contacts by pair, face_a, face_b;
-/// distances and impacts are as certified, but not the same bytes. DistanceOptions::former is not looked at.
+/// rays but any hit are too; distances, closest points and impacts are as certified, but not the same bytes. DistanceOptions::former is not looked at.
 /// Manifolds and contained bodies are found on the GPU where they are asked of a ContactQuery that the scene
 /// has answered, and by the CPU of contacts that are given as a list. So are object pairs after few bodies
 /// have changed. set_threads() is about the CPU.

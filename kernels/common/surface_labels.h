@@ -22,8 +22,8 @@ Status label_surface(const GpuAsset& asset, std::uint32_t* labels, bool& any_clo
   Status status =
       host.keep(download<TriangleTopology>(level.topology, {topology.data(), topology.size()}, stream));
   if (status == Status::kOk)
-    status =
-        host.keep(download<SurfaceComponent>(level.components, {components.data(), components.size()}, stream));
+    status = host.keep(
+        download<SurfaceComponent>(level.components, {components.data(), components.size()}, stream));
   if (status != Status::kOk) return status;
   level.topology = topology.data(), level.components = components.data();
   any_closed = false;

@@ -3,8 +3,8 @@
 
 namespace tandem {
 
-/// The distance of a triangle, t.a, from a point, three times in t.b, by float64, with a guess that takes less
-/// time than that of triangle_distance(). False: float64 is not sure enough, and triangle_distance() or
+/// The distance of a triangle, t.a, from a point, three times in t.b, by float64, with a guess that takes
+/// less time than that of triangle_distance(). False: float64 is not sure enough, and triangle_distance() or
 /// find_distance() is.
 TANDEM_HD inline bool point_distance_by_float64(const TrianglePair& t, const DistanceTolerance& tolerance,
                                                 TriangleDistance& out) {

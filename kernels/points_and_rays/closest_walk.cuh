@@ -2,7 +2,8 @@
 #include "kernels/points_and_rays/closest_search.h"
 #include "kernels/points_and_rays/probe_walks.cuh"
 
-// The search of one point through all bodies, by a thread. Decide: what decides a distance, see ClosestSearch.
+// The search of one point through all bodies, by a thread. Decide: what decides a distance, see
+// ClosestSearch.
 namespace tandem::gpu {
 namespace {
 
@@ -128,7 +129,8 @@ __device__ bool find_row(const ClosestArgs& args, std::uint32_t number, const De
   if (args.instances.count != 0) {
     probe::visit_bodies(
         PlacesOfBodies{args}, [&](const WorldBox& box) { return probe::distance_to(box, search.point); },
-        search.upper, [&](std::uint32_t body) {
+        search.upper,
+        [&](std::uint32_t body) {
           search.body = body;
           if (decided) decided = search_body(args.bodies[body], source, search);
         });

@@ -1,8 +1,8 @@
 #pragma once
 #include "kernels/points_and_rays/ray_walk.cuh"
 
-// The rays that float64 left, anew, by whole numbers, and the order of all hits of a ray. Each number of words
-// is a file of its own, since they take minutes to compile.
+// The rays that float64 left, anew, by whole numbers, and the order of all hits of a ray. Each number of
+// words is a file of its own, since they take minutes to compile.
 namespace tandem::gpu {
 namespace {
 
@@ -22,24 +22,25 @@ struct Exactly {
   }
 
   __device__ __noinline__ tandem::ray::Answer meets(const WorldRay& ray, const double (&corner)[3][3],
-                                            tandem::ray::Meeting& out) const {
+                                                    tandem::ray::Meeting& out) const {
     if (!has_words(ray, corner, corner)) return tandem::ray::Answer::no;
     const bool met = tandem::ray::find_meeting<kWords>(ray.origin, ray.direction, corner, out) &&
                      tandem::ray::is_within<kWords>(ray.origin, ray.direction, corner, out, ray.reach);
     return met ? tandem::ray::Answer::yes : tandem::ray::Answer::no;
   }
 
-  __device__ __noinline__ tandem::ray::Answer comes_before(const WorldRay& ray, const tandem::ray::FoundHit& x,
-                                                   const ProbedBody& body_x, const tandem::ray::FoundHit& y,
-                                                   const ProbedBody& body_y) const {
+  __device__ __noinline__ tandem::ray::Answer comes_before(const WorldRay& ray,
+                                                           const tandem::ray::FoundHit& x,
+                                                           const ProbedBody& body_x,
+                                                           const tandem::ray::FoundHit& y,
+                                                           const ProbedBody& body_y) const {
     const tandem::ray::Answer answer = tandem::ray::comes_before_by_float64(x, y);
     if (answer != tandem::ray::Answer::unsure) return answer;
     double of_x[3][3], of_y[3][3];
     corners_of(body_x, x.triangle, of_x);
     corners_of(body_y, y.triangle, of_y);
-    const bool is_first =
-        has_words(ray, of_x, of_y) &&
-        tandem::ray::comes_before_exactly<kWords>(ray.origin, ray.direction, x, of_x, y, of_y);
+    const bool is_first = has_words(ray, of_x, of_y) && tandem::ray::comes_before_exactly<kWords>(
+                                                            ray.origin, ray.direction, x, of_x, y, of_y);
     return is_first ? tandem::ray::Answer::yes : tandem::ray::Answer::no;
   }
 };

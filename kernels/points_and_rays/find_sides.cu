@@ -40,8 +40,7 @@ __device__ void count_crossings(Crossings& crossings, Counter& looked_at) {
     });
   } else if (reach == RayReach::out_of_range) {
     looked_at += probe::walk_world_boxes(
-        body.pose, body.blocks,
-        [&](const WorldBox& box) { return probe::may_cross(box, crossings.point); },
+        body.pose, body.blocks, [&](const WorldBox& box) { return probe::may_cross(box, crossings.point); },
         [&](std::uint32_t triangle) {
           crossings.take(triangle);
           return true;

@@ -138,8 +138,8 @@ __device__ Status check_ray(const double* origin, const double* direction) {
 __global__ void __launch_bounds__(kThreads) make_ray_keys(const __grid_constant__ RayArgs args) {
   const std::uint32_t i = blockIdx.x * kThreads + threadIdx.x;
   if (i >= args.probe_count) return;
-  const double *const origin = args.origins + std::uint64_t{3} * i,
-                      *const direction = args.directions + std::uint64_t{3} * i;
+  const double *const origin = args.origins + std::uint64_t{3} * i, *const direction = args.directions +
+                                                                                       std::uint64_t{3} * i;
   const Status status = check_ray(origin, direction);
   std::uint32_t key = 0;
   if (status == Status::kOk) {

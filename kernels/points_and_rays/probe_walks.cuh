@@ -3,8 +3,9 @@
 #include "kernels/geometry/frame_probe.h"
 #include "kernels/points_and_rays/probe_data.h"
 
-// Walks of one tree by a thread, of a point or a ray in the body's frame: the tests of frame_probe.h, as those
-// on the CPU, the nearest nodes first. A block is a cache line, which threads beside each other read together.
+// Walks of one tree by a thread, of a point or a ray in the body's frame: the tests of frame_probe.h, as
+// those on the CPU, the nearest nodes first. A block is a cache line, which threads beside each other read
+// together.
 namespace tandem::gpu {
 namespace {
 

@@ -3,8 +3,8 @@
 #include "kernels/points_and_rays/ray_rows.h"
 
 // The search for the hits of one ray through all bodies, by a thread. Decide: what decides about a ray and
-// triangles, each answer no, yes or unsure: meets(ray, corner, meeting) whether the ray meets a triangle within
-// reach, and comes_before(ray, x, body of x, y, body of y) whether hit x comes before hit y.
+// triangles, each answer no, yes or unsure: meets(ray, corner, meeting) whether the ray meets a triangle
+// within reach, and comes_before(ray, x, body of x, y, body of y) whether hit x comes before hit y.
 namespace tandem::gpu {
 namespace {
 
@@ -88,8 +88,8 @@ __device__ bool search_body(const RayArgs& args, std::uint32_t number, std::uint
 template <typename Decide>
 __device__ bool find_hits(const RayArgs& args, std::uint32_t number, const Decide& decide,
                           RaySearch& search) {
-  search.ray = world_ray(args.origins + std::uint64_t{3} * number, args.directions + std::uint64_t{3} * number,
-                         args.reach);
+  search.ray = world_ray(args.origins + std::uint64_t{3} * number,
+                         args.directions + std::uint64_t{3} * number, args.reach);
   search.last = args.reach;
   search.found = false;
   search.sure = true;
@@ -109,10 +109,10 @@ __device__ bool find_hits(const RayArgs& args, std::uint32_t number, const Decid
   if (args.instances.count != 0) probe::visit_bodies(PlacesOfBodies{args}, first_in, limit, visit);
   if (!search.sure) return false;
   if (args.wanted == RayHits::all) return true;
-  args.rows[number] = search.found
-                          ? row_of(number, search.best,
-                                   args.bodies[search.best.body].triangles[search.best.triangle].source_face())
-                          : row_without_hit(number);
+  args.rows[number] =
+      search.found ? row_of(number, search.best,
+                            args.bodies[search.best.body].triangles[search.best.triangle].source_face())
+                   : row_without_hit(number);
   return true;
 }
 

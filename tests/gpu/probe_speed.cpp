@@ -60,10 +60,11 @@ double median_of(cudaStream_t stream, const Enqueue& enqueue) {
 
 template <typename Report>
 void print(const char* what, double milliseconds, std::uint32_t count, const Report& report) {
-  std::printf("%-24s %8.3f ms, %7.1f million a second; %u left by float64, %.1f blocks and %.2f triangles each\n",
-              what, milliseconds, 1e-3 * count / milliseconds, report.exact,
-              static_cast<double>(report.counters.blocks) / count,
-              static_cast<double>(report.counters.by_float64) / count);
+  std::printf(
+      "%-24s %8.3f ms, %7.1f million a second; %u left by float64, %.1f blocks and %.2f triangles each\n",
+      what, milliseconds, 1e-3 * count / milliseconds, report.exact,
+      static_cast<double>(report.counters.blocks) / count,
+      static_cast<double>(report.counters.by_float64) / count);
 }
 
 int run(const char* path, std::uint32_t count) {

@@ -447,9 +447,8 @@ TEST_F(GpuTest, ProbesAreCapturedIntoAGraph) {
   const auto hits = test::download(rays.rows(), rays.report().rows);
   stream.capture([&] {
     const Status status = closest.enqueue(on.scene.instances(), on.closest(), stream.get());
-    return status == Status::kOk
-               ? rays.enqueue(on.scene.instances(), on.options(RayHits::all), stream.get())
-               : status;
+    return status == Status::kOk ? rays.enqueue(on.scene.instances(), on.options(RayHits::all), stream.get())
+                                 : status;
   });
   for (int launch = 0; launch < 2; ++launch) {
     stream.launch();

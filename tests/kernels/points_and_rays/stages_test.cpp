@@ -60,8 +60,7 @@ TEST(Stages, WhatFloat64IsSureOfOfRaysIsTrue) {
         if (!ray::find_meeting(origin, direction, corner, hit.meeting)) continue;
         if (any) {
           const ray::Answer first = ray::comes_before_by_float64(hit, before);
-          const bool is_first =
-              ray::comes_before_exactly(origin, direction, hit, corner, before, of_before);
+          const bool is_first = ray::comes_before_exactly(origin, direction, hit, corner, before, of_before);
           ASSERT_TRUE(first == ray::Answer::unsure || (first == ray::Answer::yes) == is_first);
           ordered += first != ray::Answer::unsure;
         }

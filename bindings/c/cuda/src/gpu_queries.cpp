@@ -413,21 +413,22 @@ tandem_status tandem_gpu_ray_query_reserve(tandem_gpu_ray_query* query,
 }
 
 // Questions about instances alone: how they are queued, how they are asked, and their rows.
-#define TANDEM_GPU_PROBES(handle, of_query, given_options, row)                                           \
-  tandem_status handle##_enqueue(handle* query, const tandem_gpu_instances* instances,                    \
-                                 const given_options* given, tandem_stream stream) {                      \
-    return ask(query, {instances, nullptr, stream, true}, given,                                          \
-               [&](auto& self, auto& bodies, auto&, auto& options) {                                      \
-                 return self.enqueue(bodies, options, stream);                                            \
-               });                                                                                        \
-  }                                                                                                       \
-  tandem_status handle##_find(handle* query, const tandem_gpu_instances* instances,                       \
-                              const given_options* given, tandem_stream stream) {                         \
-    return ask(query, {instances, nullptr, stream, true}, given,                                          \
-               [&](auto& self, auto& bodies, auto&, auto& options) { return self.find(bodies, options, stream); }); \
-  }                                                                                                       \
-  const row* handle##_rows(const handle* query) {                                                         \
-    return rows_of<row>(query, &of_query::rows);                                                          \
+#define TANDEM_GPU_PROBES(handle, of_query, given_options, row)                                              \
+  tandem_status handle##_enqueue(handle* query, const tandem_gpu_instances* instances,                       \
+                                 const given_options* given, tandem_stream stream) {                         \
+    return ask(query, {instances, nullptr, stream, true}, given,                                             \
+               [&](auto& self, auto& bodies, auto&, auto& options) {                                         \
+                 return self.enqueue(bodies, options, stream);                                               \
+               });                                                                                           \
+  }                                                                                                          \
+  tandem_status handle##_find(handle* query, const tandem_gpu_instances* instances,                          \
+                              const given_options* given, tandem_stream stream) {                            \
+    return ask(                                                                                              \
+        query, {instances, nullptr, stream, true}, given,                                                    \
+        [&](auto& self, auto& bodies, auto&, auto& options) { return self.find(bodies, options, stream); }); \
+  }                                                                                                          \
+  const row* handle##_rows(const handle* query) {                                                            \
+    return rows_of<row>(query, &of_query::rows);                                                             \
   }
 
 TANDEM_GPU_PROBES(tandem_gpu_closest_query, GpuClosestQuery, tandem_gpu_closest_options, tandem_closest_point)

@@ -41,9 +41,10 @@ TANDEM_API int tandem_cuda_error(void);
 /// Makes a scene whose questions the current GPU answers: all functions of tandem.h take it, and rows come
 /// back to CPU memory. A program whose scenes tandem_scene_create() makes runs on a GPU with this one word.
 /// Contacts, manifolds, contained bodies, verdicts and rays (but any hit) are those of the CPU; distances,
-/// closest points and impacts are as certified, but not the same bytes. tandem_scene_set_assets() copies assets to the GPU, questions copy
-/// bodies that have changed. Any function may return a status of the GPU, and TANDEM_NO_ORIENTED_BLOCKS.
-/// The rest of this header is for programs whose poses or results lie in GPU memory.
+/// closest points and impacts are as certified, but not the same bytes. tandem_scene_set_assets() copies
+/// assets to the GPU, questions copy bodies that have changed. Any function may return a status of the GPU,
+/// and TANDEM_NO_ORIENTED_BLOCKS. The rest of this header is for programs whose poses or results lie in GPU
+/// memory.
 TANDEM_API tandem_status tandem_gpu_scene_create(const tandem_allocator* allocator, tandem_scene** scene);
 /// Makes what answers on the current GPU, for tandem_scene_create_on().
 TANDEM_API tandem_status tandem_gpu_device_create(const tandem_allocator* allocator, tandem_device** device);
@@ -591,14 +592,14 @@ typedef struct tandem_gpu_closest_query tandem_gpu_closest_query;
 
 typedef struct tandem_gpu_closest_options {
   uint32_t struct_size;
-  uint32_t limit_reach;         ///< 1: points surely farther away than `reach` have no closest point
-  double reach;                 ///< where limit_reach is 1
-  double absolute_tolerance;    ///< upper - lower <= max(absolute, relative * upper)
-  double relative_tolerance;    ///< 0: 1e-6; at the finest 2^-48
-  const double* points;         ///< in GPU memory: x, y, z of each
-  const uint8_t* looked_at;     ///< in GPU memory, of each instance: 0 where it is passed over. Null: all are
+  uint32_t limit_reach;       ///< 1: points surely farther away than `reach` have no closest point
+  double reach;               ///< where limit_reach is 1
+  double absolute_tolerance;  ///< upper - lower <= max(absolute, relative * upper)
+  double relative_tolerance;  ///< 0: 1e-6; at the finest 2^-48
+  const double* points;       ///< in GPU memory: x, y, z of each
+  const uint8_t* looked_at;   ///< in GPU memory, of each instance: 0 where it is passed over. Null: all are
   uint32_t point_count;
-  uint32_t sides;               ///< 1: `within` and `winding` are asked for
+  uint32_t sides;  ///< 1: `within` and `winding` are asked for
 } tandem_gpu_closest_options;
 
 typedef struct tandem_gpu_closest_capacity {
@@ -647,8 +648,8 @@ typedef struct tandem_gpu_ray_query tandem_gpu_ray_query;
 
 typedef struct tandem_gpu_ray_options {
   uint32_t struct_size;
-  uint32_t hits;             ///< TANDEM_FIRST_HIT, TANDEM_ANY_HIT or TANDEM_ALL_HITS
-  uint32_t limit_reach;      ///< 1: parameters beyond `reach` do not count
+  uint32_t hits;         ///< TANDEM_FIRST_HIT, TANDEM_ANY_HIT or TANDEM_ALL_HITS
+  uint32_t limit_reach;  ///< 1: parameters beyond `reach` do not count
   uint32_t ray_count;
   double reach;              ///< where limit_reach is 1
   const double* origins;     ///< in GPU memory: x, y, z of each

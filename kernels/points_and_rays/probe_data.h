@@ -135,6 +135,8 @@ cudaError_t cast_rays(const RayArgs& args, cudaStream_t stream);
 cudaError_t cast_rays_exactly(const RayArgs& args, cudaStream_t stream);
 cudaError_t order_hits(const RayArgs& args, cudaStream_t stream);
 cudaError_t sort_hits(const RayArgs& args, cudaStream_t stream);
+cudaError_t cast_rays_of_most_words(const RayArgs& args, cudaStream_t stream);
+cudaError_t sort_hits_of_most_words(const RayArgs& args, cudaStream_t stream);
 
 #ifdef __CUDACC__
 

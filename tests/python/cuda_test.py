@@ -298,6 +298,47 @@ def test_distances_impacts_and_verdicts(torch, assets):
 
 
 @needs_gpu
+def test_points_and_rays_are_those_of_the_cpu(assets, library):
+    asset, pose = make_scene()
+    random = np.random.default_rng(5)
+    points, along = 3 * random.random((2000, 3)) - 0.25, random.normal(size=(2000, 3))
+    query, on_cpu = cuda.Query(assets), tandem.Scene(assets).place(cpu_instances(asset, pose))
+    bodies = query.instances(library.put(asset), library.put(pose))
+    found = query.closest(library.put(points), bodies, sides=True)
+    rows, theirs = found.numpy(), on_cpu.closest(points, sides=True)
+    assert np.all(rows["lower"] <= theirs["upper"]) and np.all(theirs["lower"] <= rows["upper"])
+    assert np.array_equal(rows["within"], theirs["within"]) and np.array_equal(rows["winding"], theirs["winding"])
+    assert len({*rows["winding"]}) > 1 and found["winding"].dtype == "int32"
+    for hits in ("first", "all"):
+        assert np.array_equal(query.rays(library.put(points), library.put(along), bodies, hits=hits).numpy(), on_cpu.rays(points, along, hits=hits))
+    within, theirs = (scene.rays(*of, hits="any", reach=0.5) for scene, of in ((query, (library.put(points), library.put(along), bodies)), (on_cpu, (points, along))))
+    assert np.array_equal(within.numpy()["body"] == tandem.NO_INDEX, theirs["body"] == tandem.NO_INDEX)
+    words = library.take(found)
+    assert library.pointer(words) == found.words.pointer
+
+
+@needs_gpu
+def test_what_is_no_point_and_no_ray_is_named(torch, posed):
+    query, bodies = posed
+    points = torch.zeros((5, 3), dtype=torch.float64, device="cuda")
+    along = torch.ones_like(points)
+    along[3] = 0
+    with pytest.raises(tandem.Error) as caught:
+        query.rays(points, along, bodies)
+    assert (caught.value.name, caught.value.where) == ("NoDirection", 3)
+    points[2, 1] = float("nan")
+    with pytest.raises(tandem.Error) as caught:
+        query.closest(points, bodies)
+    assert (caught.value.name, caught.value.where) == ("OutOfRange", 2)
+    for error, words, given in ((TypeError, "points is float32", points.float()), (ValueError, r"points has shape \(15,\)", points.reshape(15))):
+        with pytest.raises(error, match=words):
+            query.closest(given, bodies)
+    with pytest.raises(ValueError, match="directions has shape"):
+        query.rays(along, along[:4].contiguous(), bodies)
+    assert len(query.closest(points[:0], bodies)) == len(query.rays(points[:0], along[:0], bodies)) == 0
+
+
+@needs_gpu
 def test_filters_and_pairs(torch, assets):
     asset, pose = make_scene()
     motion = np.where(np.arange(COUNT) % 3 == 0, tandem.FIXED, tandem.MOVING).astype(np.uint8)

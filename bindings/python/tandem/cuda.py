@@ -18,7 +18,7 @@ import numpy.typing as npt
 from ._arrays import FARTHEST, FINITE, amount, flag, pairs_of, whole_number
 from ._asset import Asset, _choice
 from ._errors import Error
-from ._rows import CONTACT, CONTAINMENT, DISTANCE, IMPACT, MANIFOLD, PAIR, POINT, VERDICT
+from ._rows import CLOSEST_POINT, CONTACT, CONTAINMENT, DISTANCE, IMPACT, MANIFOLD, PAIR, POINT, RAY_HIT, VERDICT
 from ._scene import Counters, cores_of
 
 try:
@@ -35,8 +35,9 @@ make_device = _cuda.make_device  # for tandem.Scene
 
 _MODES = ("exact", "fast", "boxes")
 _CONTENTS = ("all", "exact", "manifolds")
+_HITS = ("first", "any", "all")
 _MOST = (1 << 31) - 1
-_KINDS = {"u": 1, "f": 2}
+_KINDS = {"i": 0, "u": 1, "f": 2}
 _REPORT = np.dtype([("status", "<u4"), ("complete", "<u4"), ("where", "<u8"), ("needed_pairs", "<u4"), ("reserved", "<u4"), ("needed_contacts", "<u8"),
                     ("needed_undecided", "<u8"), ("contacts", "<u8"), ("world_pairs", "<u8"), ("counters", "<u8", (7,))])
 _MANIFOLD_REPORT = np.dtype([("status", "<u4"), ("complete", "<u4"), ("needed_pairs", "<u4"), ("reserved", "<u4"), ("needed_contacts", "<u8"), ("needed_manifolds", "<u4"),
@@ -52,7 +53,7 @@ def _columns(dtype: np.dtype[Any]) -> dict[str, tuple[int, int, int, int]]:
     return columns
 
 
-_FIELDS = {dtype: _columns(dtype) for dtype in (PAIR, CONTACT, MANIFOLD, POINT, CONTAINMENT, DISTANCE, IMPACT, VERDICT, _REPORT, _MANIFOLD_REPORT)}
+_FIELDS = {dtype: _columns(dtype) for dtype in (PAIR, CLOSEST_POINT, CONTACT, MANIFOLD, POINT, CONTAINMENT, DISTANCE, IMPACT, RAY_HIT, VERDICT, _REPORT, _MANIFOLD_REPORT)}
 
 
 class Rows:
@@ -424,6 +425,33 @@ class Query:
         bodies, given, chosen, on = self._about(instances, asset, pose, pairs, filter, stream)
         found = self._core.verdicts(bodies, amount(tolerance, "tolerance", FARTHEST), given, chosen, on)
         return Verdicts(_found(found[0], pairs), Rows(found[1], VERDICT))
+
+    def closest(self, points: Any, instances: Instances | None = None, *, asset: Any = None, pose: Any = None, reach: float | None = None,
+                absolute_tolerance: float = 0.0, relative_tolerance: float = 0.0, sides: bool = False, stream: Any = None) -> Rows:
+        """Finds the closest point of the bodies' surfaces to each of the points: rows of CLOSEST_POINT, as certified as the CPU's and with the same sides, but not
+        its bytes.
+
+        Args:
+            points: (n, 3) float64, in GPU memory.
+
+        The others: as of `tandem.Scene.closest`.
+        """
+        bodies, _, _, on = self._about(instances, asset, pose, None, None, stream)
+        return Rows(self._core.closest(bodies, points, None if reach is None else amount(reach, "reach", np.inf),
+                                       amount(absolute_tolerance, "absolute_tolerance", np.inf), amount(relative_tolerance, "relative_tolerance", np.inf),
+                                       flag(sides, "sides"), on), CLOSEST_POINT)
+
+    def rays(self, origins: Any, directions: Any, instances: Instances | None = None, *, asset: Any = None, pose: Any = None, reach: float | None = None,
+             hits: Literal["first", "any", "all"] = "first", stream: Any = None) -> Rows:
+        """Finds where rays meet the bodies: rows of RAY_HIT, those of the CPU byte for byte, but that another of any hits may be named.
+
+        Args:
+            origins, directions: (n, 3) float64, in GPU memory.
+
+        The others: as of `tandem.Scene.rays`.
+        """
+        bodies, _, _, on = self._about(instances, asset, pose, None, None, stream)
+        return Rows(self._core.rays(bodies, origins, directions, None if reach is None else amount(reach, "reach", np.inf), _choice("hits", hits, _HITS), on), RAY_HIT)
 
     def reserve(self, *, instances: int, pairs: int, contacts: int, undecided: int | None = None, mode: Literal["exact", "fast", "boxes"] = "exact",
                 first_contact_only: bool = False, within: float = 0.0, add_error_bounds: bool = False, leave_out_rings: int = 0, sorted: bool = False,

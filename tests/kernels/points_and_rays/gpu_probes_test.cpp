@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <sstream>
 #include <string>
 #include <thread>
 
@@ -44,15 +45,17 @@ struct Both {
 };
 
 std::string text_of(const RayHit& hit) {
-  return "ray " + std::to_string(hit.ray) + " t " + std::to_string(hit.t) + " body " +
-         std::to_string(hit.body) + " triangle " + std::to_string(hit.triangle) + " weights " +
-         std::to_string(hit.weight[0]) + ' ' + std::to_string(hit.weight[1]);
+  std::ostringstream out;
+  out << "ray " << hit.ray << " t " << hit.t << " body " << hit.body << " triangle " << hit.triangle
+      << " weights " << hit.weight[0] << ' ' << hit.weight[1];
+  return out.str();
 }
 
 std::string text_of(const ClosestPoint& row) {
-  return "[" + std::to_string(row.lower) + ", " + std::to_string(row.upper) + "] body " +
-         std::to_string(row.body) + " triangle " + std::to_string(row.triangle) + " within " +
-         std::to_string(row.within) + " winding " + std::to_string(row.winding);
+  std::ostringstream out;
+  out << '[' << row.lower << ", " << row.upper << "] body " << row.body << " triangle " << row.triangle
+      << " within " << row.within << " winding " << row.winding;
+  return out.str();
 }
 
 /// The rows are the same bytes; names those that are not.

@@ -26,6 +26,8 @@ struct tandem_gpu_contact_query : GpuHandle<GpuContactQuery> {
 struct tandem_gpu_manifolds : GpuHandle<GpuManifoldQuery> {};
 struct tandem_gpu_containment_query : GpuHandle<GpuContainmentQuery> {};
 struct tandem_gpu_distance_query : GpuHandle<GpuDistanceQuery> {};
+struct tandem_gpu_closest_query : GpuHandle<GpuClosestQuery> {};
+struct tandem_gpu_ray_query : GpuHandle<GpuRayQuery> {};
 struct tandem_gpu_impact_query : GpuHandle<GpuImpactQuery> {};
 struct tandem_gpu_tolerance_query : GpuHandle<GpuToleranceQuery> {};
 
@@ -79,6 +81,38 @@ Read<GpuDistanceOptions> read_options(const tandem_gpu_distance_options* given) 
   if (read.relative_tolerance != 0) options.tolerance.relative = read.relative_tolerance;
   if (read.limit_reach != 0) options.reach = read.reach;
   options.former = reinterpret_cast<const ObjectDistance*>(read.former);
+  return {TANDEM_OK, options};
+}
+
+Read<GpuClosestOptions> read_options(const tandem_gpu_closest_options* given) {
+  tandem_gpu_closest_options read;
+  if (const tandem_status status = read_struct(given, read); status != TANDEM_OK) return {status, {}};
+  if (read.limit_reach > 1 || read.sides > 1) return {TANDEM_BAD_OPTION, {}};
+  if (!is_there(read.points, read.point_count)) return {TANDEM_NULL_ARGUMENT, {}};
+  GpuClosestOptions options;
+  options.points = read.points;
+  options.point_count = read.point_count;
+  options.tolerance.absolute = read.absolute_tolerance;
+  if (read.relative_tolerance != 0) options.tolerance.relative = read.relative_tolerance;
+  if (read.limit_reach != 0) options.reach = read.reach;
+  options.sides = read.sides != 0;
+  options.looked_at = read.looked_at;
+  return {TANDEM_OK, options};
+}
+
+Read<GpuRayOptions> read_options(const tandem_gpu_ray_options* given) {
+  tandem_gpu_ray_options read;
+  if (const tandem_status status = read_struct(given, read); status != TANDEM_OK) return {status, {}};
+  if (read.limit_reach > 1) return {TANDEM_BAD_OPTION, {}};
+  if (!is_there(read.origins, read.ray_count) || !is_there(read.directions, read.ray_count))
+    return {TANDEM_NULL_ARGUMENT, {}};
+  GpuRayOptions options;
+  options.origins = read.origins;
+  options.directions = read.directions;
+  options.ray_count = read.ray_count;
+  if (read.limit_reach != 0) options.reach = read.reach;
+  options.hits = static_cast<RayHits>(read.hits);
+  options.looked_at = read.looked_at;
   return {TANDEM_OK, options};
 }
 
@@ -158,6 +192,8 @@ TANDEM_GPU_QUERY(tandem_gpu_manifolds, tandem_gpu_manifold_report)
 TANDEM_GPU_QUERY(tandem_gpu_containment_query, tandem_gpu_containment_report)
 TANDEM_GPU_QUERY(tandem_gpu_distance_query, tandem_gpu_distance_report)
 TANDEM_GPU_QUERY(tandem_gpu_impact_query, tandem_gpu_impact_report)
+TANDEM_GPU_QUERY(tandem_gpu_closest_query, tandem_gpu_closest_report)
+TANDEM_GPU_QUERY(tandem_gpu_ray_query, tandem_gpu_ray_report)
 TANDEM_GPU_HANDLE(tandem_gpu_tolerance_query, tandem_gpu_tolerance_report)
 
 tandem_status tandem_gpu_contact_query_reserve(tandem_gpu_contact_query* query,
@@ -365,3 +401,35 @@ tandem_status tandem_gpu_tolerance_query_find(tandem_gpu_tolerance_query* query,
 const tandem_verdict* tandem_gpu_tolerance_query_verdicts(const tandem_gpu_tolerance_query* query) {
   return rows_of<tandem_verdict>(query, &GpuToleranceQuery::verdicts);
 }
+
+tandem_status tandem_gpu_closest_query_reserve(tandem_gpu_closest_query* query,
+                                               const tandem_gpu_closest_capacity* capacity) {
+  return reserve<GpuClosestCapacity>(query, capacity);
+}
+
+tandem_status tandem_gpu_ray_query_reserve(tandem_gpu_ray_query* query,
+                                           const tandem_gpu_ray_capacity* capacity) {
+  return reserve<GpuRayCapacity>(query, capacity);
+}
+
+// Questions about instances alone: how they are queued, how they are asked, and their rows.
+#define TANDEM_GPU_PROBES(handle, of_query, given_options, row)                                              \
+  tandem_status handle##_enqueue(handle* query, const tandem_gpu_instances* instances,                       \
+                                 const given_options* given, tandem_stream stream) {                         \
+    return ask(query, {instances, nullptr, stream, true}, given,                                             \
+               [&](auto& self, auto& bodies, auto&, auto& options) {                                         \
+                 return self.enqueue(bodies, options, stream);                                               \
+               });                                                                                           \
+  }                                                                                                          \
+  tandem_status handle##_find(handle* query, const tandem_gpu_instances* instances,                          \
+                              const given_options* given, tandem_stream stream) {                            \
+    return ask(                                                                                              \
+        query, {instances, nullptr, stream, true}, given,                                                    \
+        [&](auto& self, auto& bodies, auto&, auto& options) { return self.find(bodies, options, stream); }); \
+  }                                                                                                          \
+  const row* handle##_rows(const handle* query) {                                                            \
+    return rows_of<row>(query, &of_query::rows);                                                             \
+  }
+
+TANDEM_GPU_PROBES(tandem_gpu_closest_query, GpuClosestQuery, tandem_gpu_closest_options, tandem_closest_point)
+TANDEM_GPU_PROBES(tandem_gpu_ray_query, GpuRayQuery, tandem_gpu_ray_options, tandem_ray_hit)

@@ -75,6 +75,8 @@ using BroadPhases = TANDEM_POOL(tandem_gpu_broad_phase);
 using ContactQueries = TANDEM_POOL(tandem_gpu_contact_query);
 using DistanceQueries = TANDEM_POOL(tandem_gpu_distance_query);
 using ImpactQueries = TANDEM_POOL(tandem_gpu_impact_query);
+using ClosestQueries = TANDEM_POOL(tandem_gpu_closest_query);
+using RayQueries = TANDEM_POOL(tandem_gpu_ray_query);
 using ToleranceQueries = TANDEM_POOL(tandem_gpu_tolerance_query);
 using ManifoldMakers = TANDEM_POOL(tandem_gpu_manifolds);
 using ContainmentQueries = TANDEM_POOL(tandem_gpu_containment_query);
@@ -104,6 +106,11 @@ class Query {
                     double tolerance, bool sorted, const GpuFilter* filter, const Stream& stream);
   nb::tuple verdicts(nb::object instances, double tolerance, nb::object pairs, const GpuFilter* filter,
                      const Stream& stream);
+
+  Rows closest(nb::object instances, nb::object points, std::optional<double> reach, double absolute,
+               double relative, bool sides, const Stream& stream);
+  Rows rays(nb::object instances, nb::object origins, nb::object directions, std::optional<double> reach,
+            std::uint32_t hits, const Stream& stream);
 
   int device() const { return assets_.device(); }
   const Assets& assets() const { return assets_; }
@@ -137,6 +144,8 @@ class Query {
   DistanceQueries distance_queries_;
   ImpactQueries impact_queries_;
   ToleranceQueries tolerance_queries_;
+  ClosestQueries closest_queries_;
+  RayQueries ray_queries_;
   ManifoldMakers::Pointer manifolds_;
   ContainmentQueries::Pointer contained_;
   std::vector<std::shared_ptr<Buffer>> copies_;

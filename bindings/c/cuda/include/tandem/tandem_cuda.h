@@ -40,10 +40,11 @@ TANDEM_API int tandem_cuda_error(void);
 
 /// Makes a scene whose questions the current GPU answers: all functions of tandem.h take it, and rows come
 /// back to CPU memory. A program whose scenes tandem_scene_create() makes runs on a GPU with this one word.
-/// Contacts, manifolds, contained bodies and verdicts are those of the CPU; distances and impacts are as
-/// certified, but not the same bytes. tandem_scene_set_assets() copies assets to the GPU, questions copy
-/// bodies that have changed. Any function may return a status of the GPU, and TANDEM_NO_ORIENTED_BLOCKS.
-/// The rest of this header is for programs whose poses or results lie in GPU memory.
+/// Contacts, manifolds, contained bodies, verdicts and rays (but any hit) are those of the CPU; distances,
+/// closest points and impacts are as certified, but not the same bytes. tandem_scene_set_assets() copies
+/// assets to the GPU, questions copy bodies that have changed. Any function may return a status of the GPU,
+/// and TANDEM_NO_ORIENTED_BLOCKS. The rest of this header is for programs whose poses or results lie in GPU
+/// memory.
 TANDEM_API tandem_status tandem_gpu_scene_create(const tandem_allocator* allocator, tandem_scene** scene);
 /// Makes what answers on the current GPU, for tandem_scene_create_on().
 TANDEM_API tandem_status tandem_gpu_device_create(const tandem_allocator* allocator, tandem_device** device);
@@ -582,6 +583,120 @@ TANDEM_API const tandem_gpu_tolerance_report* tandem_gpu_tolerance_query_device_
 TANDEM_API tandem_status tandem_gpu_tolerance_query_get_report(const tandem_gpu_tolerance_query* query,
                                                                tandem_gpu_tolerance_report* report);
 TANDEM_API size_t tandem_gpu_tolerance_query_bytes(const tandem_gpu_tolerance_query* query);
+
+/// ---- Points and rays
+
+/// Finds the closest points of the bodies' surfaces: as certified as tandem_scene_find_closest() finds them,
+/// with the same sides, but not the same bytes (docs/points_and_rays.md).
+typedef struct tandem_gpu_closest_query tandem_gpu_closest_query;
+
+typedef struct tandem_gpu_closest_options {
+  uint32_t struct_size;
+  uint32_t limit_reach;       ///< 1: points surely farther away than `reach` have no closest point
+  double reach;               ///< where limit_reach is 1
+  double absolute_tolerance;  ///< upper - lower <= max(absolute, relative * upper)
+  double relative_tolerance;  ///< 0: 1e-6; at the finest 2^-48
+  const double* points;       ///< in GPU memory: x, y, z of each
+  const uint8_t* looked_at;   ///< in GPU memory, of each instance: 0 where it is passed over. Null: all are
+  uint32_t point_count;
+  uint32_t sides;  ///< 1: `within` and `winding` are asked for
+} tandem_gpu_closest_options;
+
+typedef struct tandem_gpu_closest_capacity {
+  uint32_t instances, points;
+  uint32_t words;  ///< of a coordinate in exact arithmetic; 0: 8
+} tandem_gpu_closest_capacity;
+
+typedef struct tandem_gpu_closest_report {
+  tandem_status status;
+  uint32_t complete;  ///< 0: something did not fit; then rows mean nothing
+  uint64_t where;     ///< the instance or point to blame
+  tandem_gpu_closest_capacity needed;
+  uint32_t exact;  ///< points that float64 did not decide
+  tandem_closest_counters counters;
+} tandem_gpu_closest_report;
+
+TANDEM_API tandem_status tandem_gpu_closest_query_create(const tandem_allocator* allocator,
+                                                         tandem_gpu_closest_query** query);
+TANDEM_API void tandem_gpu_closest_query_destroy(tandem_gpu_closest_query* query);
+/// Result: TANDEM_NO_AXIS_ALIGNED_BLOCKS, where an asset was not uploaded with TANDEM_CONTENTS_ALL.
+TANDEM_API tandem_status tandem_gpu_closest_query_set_assets(tandem_gpu_closest_query* query,
+                                                             tandem_gpu_assets* assets, tandem_stream stream);
+TANDEM_API tandem_status tandem_gpu_closest_query_reserve(tandem_gpu_closest_query* query,
+                                                          const tandem_gpu_closest_capacity* capacity);
+/// Result: TANDEM_BAD_TOLERANCE or TANDEM_BAD_REACH where it is negative or NaN; TANDEM_NO_TOPOLOGY where
+/// sides are asked for and an asset has none; TANDEM_OUT_OF_RANGE for more instances or points than reserved.
+TANDEM_API tandem_status tandem_gpu_closest_query_enqueue(tandem_gpu_closest_query* query,
+                                                          const tandem_gpu_instances* instances,
+                                                          const tandem_gpu_closest_options* options,
+                                                          tandem_stream stream);
+TANDEM_API tandem_status tandem_gpu_closest_query_find(tandem_gpu_closest_query* query,
+                                                       const tandem_gpu_instances* instances,
+                                                       const tandem_gpu_closest_options* options,
+                                                       tandem_stream stream);
+/// Returns the row of each point, in GPU memory.
+TANDEM_API const tandem_closest_point* tandem_gpu_closest_query_rows(const tandem_gpu_closest_query* query);
+TANDEM_API const tandem_gpu_closest_report* tandem_gpu_closest_query_device_report(
+    const tandem_gpu_closest_query* query);
+TANDEM_API tandem_status tandem_gpu_closest_query_get_report(const tandem_gpu_closest_query* query,
+                                                             tandem_gpu_closest_report* report);
+TANDEM_API size_t tandem_gpu_closest_query_bytes(const tandem_gpu_closest_query* query);
+
+/// Finds where rays meet the bodies: the rows of tandem_scene_find_rays(), byte for byte, but that of any hit
+/// another may be named.
+typedef struct tandem_gpu_ray_query tandem_gpu_ray_query;
+
+typedef struct tandem_gpu_ray_options {
+  uint32_t struct_size;
+  uint32_t hits;         ///< TANDEM_FIRST_HIT, TANDEM_ANY_HIT or TANDEM_ALL_HITS
+  uint32_t limit_reach;  ///< 1: parameters beyond `reach` do not count
+  uint32_t ray_count;
+  double reach;              ///< where limit_reach is 1
+  const double* origins;     ///< in GPU memory: x, y, z of each
+  const double* directions;  ///< likewise, of any length but 0
+  const uint8_t* looked_at;  ///< as of tandem_gpu_closest_options
+} tandem_gpu_ray_options;
+
+typedef struct tandem_gpu_ray_capacity {
+  uint32_t instances, rays;
+  uint32_t hits;   ///< where all are asked for: rows, and those that float64 gives up again
+  uint32_t words;  ///< as of tandem_gpu_closest_capacity
+} tandem_gpu_ray_capacity;
+
+typedef struct tandem_gpu_ray_report {
+  tandem_status status;
+  uint32_t complete;  ///< 0: something did not fit; then rows mean nothing
+  uint64_t where;     ///< the instance or ray to blame
+  tandem_gpu_ray_capacity needed;
+  uint32_t rows;
+  uint32_t exact;  ///< rays that float64 did not decide
+  tandem_ray_counters counters;
+} tandem_gpu_ray_report;
+
+TANDEM_API tandem_status tandem_gpu_ray_query_create(const tandem_allocator* allocator,
+                                                     tandem_gpu_ray_query** query);
+TANDEM_API void tandem_gpu_ray_query_destroy(tandem_gpu_ray_query* query);
+/// Result: as of tandem_gpu_closest_query_set_assets().
+TANDEM_API tandem_status tandem_gpu_ray_query_set_assets(tandem_gpu_ray_query* query,
+                                                         tandem_gpu_assets* assets, tandem_stream stream);
+TANDEM_API tandem_status tandem_gpu_ray_query_reserve(tandem_gpu_ray_query* query,
+                                                      const tandem_gpu_ray_capacity* capacity);
+/// Result: TANDEM_BAD_REACH where it is negative or NaN; TANDEM_OUT_OF_RANGE for more instances or rays than
+/// reserved, or where all hits are asked for and no room for hits was reserved.
+TANDEM_API tandem_status tandem_gpu_ray_query_enqueue(tandem_gpu_ray_query* query,
+                                                      const tandem_gpu_instances* instances,
+                                                      const tandem_gpu_ray_options* options,
+                                                      tandem_stream stream);
+TANDEM_API tandem_status tandem_gpu_ray_query_find(tandem_gpu_ray_query* query,
+                                                   const tandem_gpu_instances* instances,
+                                                   const tandem_gpu_ray_options* options,
+                                                   tandem_stream stream);
+/// Returns the rows in GPU memory, as many as the report says.
+TANDEM_API const tandem_ray_hit* tandem_gpu_ray_query_rows(const tandem_gpu_ray_query* query);
+TANDEM_API const tandem_gpu_ray_report* tandem_gpu_ray_query_device_report(const tandem_gpu_ray_query* query);
+TANDEM_API tandem_status tandem_gpu_ray_query_get_report(const tandem_gpu_ray_query* query,
+                                                         tandem_gpu_ray_report* report);
+TANDEM_API size_t tandem_gpu_ray_query_bytes(const tandem_gpu_ray_query* query);
 
 #ifdef __cplusplus
 }

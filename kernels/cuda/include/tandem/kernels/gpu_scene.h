@@ -12,10 +12,10 @@ SceneDevice* gpu_scene_device();
 /// wants rows in GPU memory asks GpuContactQuery and the others, which take arrays there.
 ///
 /// Contacts, manifolds, contained bodies and verdicts are those of the CPU, contacts by pair, face_a, face_b;
-/// distances and impacts are as certified, but not the same bytes. DistanceOptions::former is not looked at.
-/// Manifolds and contained bodies are found on the GPU where they are asked of a ContactQuery that the scene
-/// has answered, and by the CPU of contacts that are given as a list. So are object pairs after few bodies
-/// have changed. set_threads() is about the CPU.
+/// rays but any hit are too; distances, closest points and impacts are as certified, but not the same bytes.
+/// DistanceOptions::former is not looked at. Manifolds and contained bodies are found on the GPU where they
+/// are asked of a ContactQuery that the scene has answered, and by the CPU of contacts that are given as a
+/// list. So are object pairs after few bodies have changed. set_threads() is about the CPU.
 ///
 /// Each function may also return kNoGpu, kDriverTooOld, kGpuNotSupported, kOutOfGpuMemory or kCudaFailed.
 /// Questions of contacts in mode exact, impacts and verdicts return kNoOrientedBlocks where an asset has

@@ -207,8 +207,8 @@ ExitCode run_probe(const ProbeArguments& arguments) {
   const LoadedScene scene = scene_of(arguments);
   const Bounds bounds = bounds_of(scene);
   const Probes probes = probes_in(bounds, arguments);
-  const double size = std::hypot(bounds.hi[0] - bounds.lo[0], bounds.hi[1] - bounds.lo[1],
-                                 bounds.hi[2] - bounds.lo[2]);
+  const double size =
+      std::hypot(bounds.hi[0] - bounds.lo[0], bounds.hi[1] - bounds.lo[1], bounds.hi[2] - bounds.lo[2]);
   const std::vector<ProbePeer> peers =
       answer_of(arguments.scene, scene, [&] { return race(arguments, scene, probes, size); });
   if (!arguments.output.empty()) write_csv(arguments, peers);
@@ -224,22 +224,21 @@ std::vector<std::string> probing_libraries() {
 }  // namespace
 
 void add_probe(Command tool, Run& run_later) {
-  const auto [command, arguments] =
-      add_command<ProbeArguments>(tool, run_later, "probe",
-                                  "time closest points and rays, beside other libraries", run_probe);
-  command.add({scene_argument(arguments, "scene file (HDF5), or a mesh (.bvh)"),
-               {"--points", arguments.points, "N [1000000]", "points in 1.5 times the bounds",
-                between(0, 4e9)},
-               {"--rays", arguments.rays, "N [1000000]", "rays from a sphere around the bounds into them",
-                between(0, 4e9)},
-               seed_option(arguments.seed, "the points and rays"),
-               {"--tolerance", arguments.tolerance, "R [1e-6]",
-                "how wide Tandem's interval of a distance may be, relative to it", between(0, 1)},
-               separated_by_commas({"--peers", arguments.peers, "embree", "other libraries, on one thread",
-                                    one_of(probing_libraries())}),
-               repeat_option(arguments, "all"),
-               output_option(arguments, "the CSV file to write, a row for each library"),
-               json_option(arguments)});
+  const auto [command, arguments] = add_command<ProbeArguments>(
+      tool, run_later, "probe", "time closest points and rays, beside other libraries", run_probe);
+  command.add(
+      {scene_argument(arguments, "scene file (HDF5), or a mesh (.bvh)"),
+       {"--points", arguments.points, "N [1000000]", "points in 1.5 times the bounds", between(0, 4e9)},
+       {"--rays", arguments.rays, "N [1000000]", "rays from a sphere around the bounds into them",
+        between(0, 4e9)},
+       seed_option(arguments.seed, "the points and rays"),
+       {"--tolerance", arguments.tolerance, "R [1e-6]",
+        "how wide Tandem's interval of a distance may be, relative to it", between(0, 1)},
+       separated_by_commas({"--peers", arguments.peers, "embree", "other libraries, on one thread",
+                            one_of(probing_libraries())}),
+       repeat_option(arguments, "all"),
+       output_option(arguments, "the CSV file to write, a row for each library"),
+       json_option(arguments)});
 }
 
 }  // namespace tandem::bench

@@ -21,8 +21,8 @@ struct Vector {
   friend float dot(Vector a, Vector b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 };
 
-/// The point of a triangle that is closest to p, in float32: Ericson, Real-Time Collision Detection, 5.1.5, as
-/// Embree's tutorial closest_point has it.
+/// The point of a triangle that is closest to p, in float32: Ericson, Real-Time Collision Detection, 5.1.5,
+/// as Embree's tutorial closest_point has it.
 Vector closest_of(Vector p, Vector a, Vector b, Vector c) {
   const Vector ab = b - a, ac = c - a, ap = p - a, bp = p - b, cp = p - c;
   const float d1 = dot(ab, ap), d2 = dot(ac, ap), d3 = dot(ab, bp), d4 = dot(ac, bp), d5 = dot(ab, cp),

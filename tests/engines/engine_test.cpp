@@ -89,6 +89,42 @@ TEST(Engines, FindTheSameDistances) {
   }
 }
 
+TEST(Engines, FindTheSameClosestPointsAndHits) {
+  const Pile pile(20);
+  RandomPoses random(5);
+  std::vector<std::array<double, 3>> from, along;
+  for (int i = 0; i < 500; ++i) {
+    auto &p = from.emplace_back(), &d = along.emplace_back();
+    for (std::size_t k = 0; k < 3; ++k) {
+      p[k] = static_cast<double>(static_cast<float>(random.symmetric(4)));
+      d[k] = static_cast<double>(static_cast<float>(random.symmetric(1)));
+    }
+  }
+  std::vector<double> expected[2];
+  for (const auto& engine : make_peers(ProbeOptions())) {
+    std::vector<double> distances, times;
+    engine->set_shapes(pile.assets.views());
+    engine->update(pile.bodies);
+    engine->find_closest(from, distances);
+    engine->find_hits(from, along, times);
+    if (expected[0].empty()) expected[0] = distances, expected[1] = times;
+    ASSERT_EQ(distances.size(), from.size()) << engine->label();
+    ASSERT_EQ(times.size(), from.size()) << engine->label();
+    std::size_t hits = 0;
+    for (std::size_t i = 0; i < from.size(); ++i) {
+      EXPECT_NEAR(distances[i], expected[0][i], 1e-5) << engine->label();
+      const bool is_same =
+          times[i] == expected[1][i] || std::abs(times[i] - expected[1][i]) < 1e-4 * times[i];
+      EXPECT_TRUE(is_same) << engine->label() << ' ' << times[i] << ' ' << expected[1][i];
+      hits += times[i] < HUGE_VAL;
+    }
+    EXPECT_GT(hits, 50u);
+  }
+  EXPECT_EQ(message_of("fcl", ProbeOptions()).empty(), false);
+  std::vector<double> none;
+  EXPECT_THROW(make_engine("tandem")->find_closest({}, none), std::logic_error);
+}
+
 TEST(Engines, FindImpactsOfTheGivenPairsAsOfThoseThatTheyFind) {
   const Pile pile(20);
   const std::vector<RigidMotion> motion(pile.bodies.size(), RigidMotion{{0, 0, -1}, {0, 0, 0}, {0, 0, 0}});

@@ -1,4 +1,4 @@
-"""The examples of docs/python.md, docs/gradients.md and of all docstrings run, and print what they say."""
+"""The examples of docs/python.md, docs/gradients.md, docs/points_and_rays.md and of all docstrings run, and print what they say."""
 import contextlib
 import doctest
 import importlib
@@ -16,7 +16,7 @@ import tandem
 from meshes import BOX_FACES, BOX_VERTICES
 
 ROOT = Path(os.environ["TANDEM_SOURCE_DIR"])
-PAGES = ["docs/python.md", "docs/gradients.md"]
+PAGES = ["docs/python.md", "docs/gradients.md", "docs/points_and_rays.md"]
 
 
 @pytest.mark.parametrize("page", PAGES)

@@ -16,7 +16,7 @@ import unittest
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from bench_test import IDENTITY, BenchTest, attributes, change, datasets, documented_keys, documented_types, table_of, types_of
+from bench_test import BVHBENCH, IDENTITY, BenchTest, attributes, change, datasets, documented_keys, documented_types, table_of, types_of
 from tool_test import BVHBUILD, CUBE_OBJ, SOURCE_DIR, UNREADABLE_INPUT, USAGE
 
 MESHES = pathlib.Path(os.environ.get("TANDEM_MESHES", SOURCE_DIR.parent / "shared" / "meshes"))
@@ -31,6 +31,29 @@ def rows_of(path, group, *others):
     """The datasets of a group by their names in it, behind others by theirs."""
     table = datasets(path)
     return {name: table[name] for name in others} | {name.split("/")[1]: column for name, column in table.items() if name.startswith(group + "/")}
+
+
+class Probes(BenchTest):
+    def probe(self, path, *options):
+        return json.loads(self.succeeds(BVHBENCH, "probe", path, "--points", "2000", "--rays", "3000", "--json", *options))
+
+    def test_a_mesh_and_a_scene_of_it_are_asked_and_written_as_a_table(self):
+        self.write_scene(translation=((0, 0, 0), (0.25, 0.125, 0.875)))
+        out = self.outputs / "probe.csv"
+        report = self.probe(self.scene, "--out", out, "--repeat", "2")
+        (peer,) = report["peers"]
+        self.assertEqual((peer["name"], peer["different_points"], peer["different_rays"]), ("Tandem", 0, 0))
+        self.assertTrue(500 < peer["hits"] < 3000, peer["hits"])
+        self.assertTrue(peer["point_nanoseconds"] > 0 < peer["ray_nanoseconds"])
+        header, row = (line.split(",") for line in out.read_text().splitlines())
+        self.assertEqual((header[0], row[0], row[1], row[6]), ("scene", self.scene.stem, "Tandem", str(peer["hits"])))
+        # Rays into a cube's bounds hit it.
+        self.assertEqual(self.probe(self.mesh)["peers"][0]["hits"], 3000)
+
+    def test_keys_are_documented(self):
+        report = self.probe(self.mesh)
+        of_report, of_peer = documented_keys("probe SCENE.h5 --json", r"\*\*Keys of a peer\*\*")
+        self.assertEqual((set(of_report), set(of_peer)), (set(report), set(report["peers"][0])))
 
 
 class Manifolds(BenchTest):

@@ -26,6 +26,7 @@ void add_deform(Command tool, Run& run_later);
 void add_economy(Command tool, Run& run_later);
 void add_frame(Command tool, Run& run_later);
 void add_poses(Command tool, Run& run_later);
+void add_probe(Command tool, Run& run_later);
 
 /// Adds a subcommand that runs with the arguments that its command line fills. Result: the subcommand, which
 /// has no options yet, and the arguments that these are to be bound to.

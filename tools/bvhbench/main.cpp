@@ -61,6 +61,7 @@ int main(int argc, char** argv) {
   add_economy(tool, run);
   add_frame(tool, run);
   add_poses(tool, run);
+  add_probe(tool, run);
   ExitCode exit_code = kDone;
   return tool.parse(argc, argv, exit_code) ? run_and_report(run) : exit_code;
 }

@@ -211,7 +211,10 @@ class EmbreeEngine final : public EngineWith<IndexedMesh> {
 
 }  // namespace
 
-std::unique_ptr<Engine> make_embree(std::string_view name, const Question&) {
+std::unique_ptr<Engine> make_embree_probes(std::string_view name);
+
+std::unique_ptr<Engine> make_embree(std::string_view name, const Question& question) {
+  if (std::holds_alternative<ProbeOptions>(question)) return make_embree_probes(name);
   return std::make_unique<EmbreeEngine>(name, name == "embree-refit" ? Following::refit : Following::rebuild);
 }
 

@@ -1,4 +1,5 @@
 #pragma once
+#include <array>
 #include <compare>
 #include <cstddef>
 #include <cstdint>
@@ -22,8 +23,17 @@
 
 namespace tandem {
 
-/// The question that an engine is made to answer, with its options: contacts, distances, impacts or verdicts.
-using Question = std::variant<ContactOptions, DistanceOptions, ImpactOptions, ToleranceOptions>;
+/// Says how closest points and first hits of rays are asked for.
+struct ProbeOptions {
+  DistanceTolerance tolerance = {};  ///< of closest points, where the engine certifies them
+};
+
+/// The question that an engine is made to answer, with its options: contacts, distances, impacts, verdicts,
+/// or points and rays.
+using Question = std::variant<ContactOptions, DistanceOptions, ImpactOptions, ToleranceOptions, ProbeOptions>;
+
+/// Points of the world.
+using Points = std::span<const std::array<double, 3>>;
 
 /// A body: its shape, by place in the list given to set_shapes(), and where it stands. The pose speaks of the
 /// coordinates of the mesh file.
@@ -255,6 +265,17 @@ class Engine {
   /// not meet in the step. Condition: set_motion() before update().
   virtual void find_impacts(std::span<const ObjectPair> /*pairs*/, std::vector<double>& /*times*/) {
     cannot("find impacts");
+  }
+
+  /// Puts the distance of the bodies' surfaces from each point into `distances`. Condition: update().
+  virtual void find_closest(Points /*points*/, std::vector<double>& /*distances*/) {
+    cannot("find closest points");
+  }
+
+  /// Puts the parameter of the first hit of each ray origin + t direction into `times`; it is infinite where
+  /// nothing is hit. Condition: update().
+  virtual void find_hits(Points /*origins*/, Points /*directions*/, std::vector<double>& /*times*/) {
+    cannot("find hits of rays");
   }
 
   /// Find pairs, where none are given, and answer the question for each of them, as often as asked. On a GPU

@@ -12,7 +12,7 @@ Maker make_tandem, make_tandem_cuda, make_paper, make_fcl, make_coal, make_embre
 namespace {
 
 // Questions that an engine answers: bits by the place of their options in Question.
-enum : unsigned { kContacts = 1, kDistances = 2, kImpacts = 4, kVerdicts = 8, kAll = 15 };
+enum : unsigned { kContacts = 1, kDistances = 2, kImpacts = 4, kVerdicts = 8, kProbes = 16, kOfPairs = 15 };
 
 // An engine that compare does not run has no library. Engines that simulate find all contacts, and the right
 // ones.
@@ -43,8 +43,8 @@ constexpr Maker *kTandemCuda = where(TANDEM_HAVE_CUDA, make_tandem_cuda),
                 *kBullet = where(TANDEM_HAVE_BULLET, make_bullet), *kOde = where(TANDEM_HAVE_ODE, make_ode);
 
 constexpr Entry kEntries[] = {
-    {"tandem", "tandem", kAll, kSimulates, "", make_tandem, true, true},
-    {"tandem-cuda", "", kAll, kSimulates, "CUDA", kTandemCuda, true, true},
+    {"tandem", "tandem", kOfPairs | kProbes, kSimulates, "", make_tandem, true, true},
+    {"tandem-cuda", "", kOfPairs, kSimulates, "CUDA", kTandemCuda, true, true},
     {"paper", "", kContacts, kSimulates, "CUDA", kPaper, true},
     {"paper-bits", "", kContacts, kSimulates, "CUDA", kPaper, true},
     {"fcl", "fcl", kContacts, kSimulates, "FCL", kFcl, false, true},
@@ -56,7 +56,7 @@ constexpr Entry kEntries[] = {
     {"fcl-public", "fcl", kImpacts, kCompares, "FCL", kFcl},
     {"coal-rss", "coal", kDistances, kCompares, "Coal", kCoal},
     {"coal-obbrss", "coal", kDistances, kCompares, "Coal", kCoal},
-    {"embree", "embree", kContacts, kSimulates, "Embree 3", kEmbree, false, true},
+    {"embree", "embree", kContacts | kProbes, kSimulates, "Embree 3", kEmbree, false, true},
     {"embree-refit", "embree", kContacts, kSimulates, "Embree 3", kEmbree, false, true},
     {"bullet", "bullet", kContacts, kCompares, "Bullet", kBullet, false, true},
     {"ode", "ode", kContacts, kCompares, "ODE", kOde},

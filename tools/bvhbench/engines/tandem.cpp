@@ -4,8 +4,10 @@
 #include <vector>
 
 #include "engine.h"
+#include "tandem/kernels/closest_query.h"
 #include "tandem/kernels/manifold_query.h"
 #include "tandem/kernels/moved_query.h"
+#include "tandem/kernels/ray_query.h"
 
 namespace tandem {
 namespace {
@@ -227,9 +229,48 @@ class TandemVerdicts final : public TandemEngine<ToleranceQuery> {
   TimedVerdicts time_verdicts(const TimedQuery& asked) override { return time<TimedVerdicts>(asked); }
 };
 
+/// Closest points and rays.
+class TandemProbes final : public Engine {
+ public:
+  TandemProbes(std::string_view name, const ProbeOptions& options) : Engine(name), options_(options) {}
+
+  std::string label() const override { return "Tandem"; }
+  std::string settings() const override {
+    return "float64 points and rays, hits decided exactly, distances certified";
+  }
+
+  void set_shapes(std::span<const AssetView> shapes) override { check(scene_.set_assets(shapes)); }
+  void update(std::span<const BodyPose> bodies) override {
+    check(scene_.set_threads(threads_));
+    check(scene_.place(bodies, filter_));
+  }
+
+  void find_closest(Points points, std::vector<double>& distances) override {
+    check(closest_.find(scene_, {.points = points, .tolerance = options_.tolerance}));
+    distances.clear();
+    for (const ClosestPoint& row : closest_.rows()) distances.push_back(row.upper);
+  }
+
+  void find_hits(Points origins, Points directions, std::vector<double>& times) override {
+    check(rays_.find(scene_, {.origins = origins, .directions = directions}));
+    times.clear();
+    for (const RayHit& row : rays_.rows()) times.push_back(row.t);
+  }
+
+ private:
+  void check(Status status) const { require(status, scene_.where()); }
+
+  ProbeOptions options_;
+  Scene scene_;
+  ClosestQuery closest_;
+  RayQuery rays_;
+};
+
 }  // namespace
 
 std::unique_ptr<Engine> make_tandem(std::string_view name, const Question& question) {
+  if (const auto* probes = std::get_if<ProbeOptions>(&question))
+    return std::make_unique<TandemProbes>(name, *probes);
   return make_for<TandemContacts, TandemDistances, TandemImpacts, TandemVerdicts>(question, name);
 }
 

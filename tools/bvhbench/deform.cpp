@@ -28,12 +28,9 @@ void note_least(double& least, std::uint32_t repeat, double seconds) {
   least = repeat == 0 ? seconds : std::min(least, seconds);
 }
 
-// The positions of the shapes that bend, in their order.
-using FramePositions = std::vector<Positions>;
-
-FramePositions read_frame(const BendingScene& scene, std::uint32_t number) {
-  FramePositions frame;
-  for (const std::uint32_t shape : scene.bending) frame.push_back(scene.positions(shape, number));
+FrameOfShapes read_frame(const BendingScene& scene, std::uint32_t number) {
+  FrameOfShapes frame;
+  for (const std::uint32_t shape : scene.bending) frame.push_back({shape, scene.positions(shape, number)});
   return frame;
 }
 
@@ -64,14 +61,8 @@ class Follower {
   }
 
   // Result: the largest looseness of the shapes.
-  std::optional<double> follow(const FramePositions& frame, std::uint32_t number) {
-    std::optional<double> loosest;
-    seconds_on_gpu_ = 0;
-    for (std::size_t i = 0; i < frame.size(); ++i) {
-      loosest = std::max(loosest, deform(*engine_, scene_.bending[i], frame[i], scene_.path, number));
-      seconds_on_gpu_ += engine_->times().update;
-    }
-    return loosest;
+  std::optional<double> follow(const FrameOfShapes& frame, std::uint32_t number) {
+    return deform(*engine_, frame, scene_.path, number);
   }
 
   // Asks about the given pairs; without any, Tandem finds them itself.
@@ -96,11 +87,11 @@ class Follower {
     if (own_) work.block_pairs = engine_->counters().block_pairs;
   }
 
-  FrameWork work(const FramePositions& frame, std::uint32_t number, std::span<const ObjectPair> pairs) {
+  FrameWork work(const FrameOfShapes& frame, std::uint32_t number, std::span<const ObjectPair> pairs) {
     FrameWork work;
     for (std::uint32_t i = 0; i < options_.repeats; ++i) {
       const double seconds = seconds_by(options_.threads, [&] { work.looseness = follow(frame, number); });
-      note_least(work.update_seconds, i, on_gpu_ ? seconds_on_gpu_ : seconds);
+      note_least(work.update_seconds, i, on_gpu_ ? engine_->times().update : seconds);
       if (!on_gpu_) time_query(work, i, pairs);
     }
     if (on_gpu_)
@@ -123,7 +114,6 @@ class Follower {
   const BendingScene& scene_;
   const DeformOptions& options_;
   const bool on_gpu_, own_;
-  double seconds_on_gpu_ = 0;  // of the last follow()
   std::unique_ptr<Engine> engine_;
   std::vector<ObjectPair> pairs_;
   TriangleContacts contacts_;
@@ -139,17 +129,17 @@ class Rebuilder {
 
   // A file holds float32 numbers: where positions are others, the new trees are refitted to these. Result:
   // nothing where a shape has no triangle left.
-  std::optional<FrameWork> work(const FramePositions& frame, std::uint32_t number,
+  std::optional<FrameWork> work(const FrameOfShapes& frame, std::uint32_t number,
                                 std::span<const ObjectPair> pairs) {
     FrameWork work;
     bool has_trees = true;
     work.update_seconds = seconds_by(options_.threads, [&] { has_trees = build(frame); });
     if (!has_trees) return {};
     follower_.place(views_);
-    for (std::size_t i = 0; i < frame.size(); ++i) {
-      if (std::holds_alternative<std::vector<double>>(frame[i]))
-        deform(follower_.engine(), scene_.bending[i], frame[i], scene_.path, number);
-    }
+    FrameOfShapes in_float64;
+    std::copy_if(frame.begin(), frame.end(), std::back_inserter(in_float64),
+                 [](const auto& of) { return std::holds_alternative<std::vector<double>>(of.positions); });
+    deform(follower_.engine(), in_float64, scene_.path, number);
     for (std::uint32_t i = 0; i < options_.repeats; ++i) follower_.time_query(work, i, pairs);
     follower_.take_answer(work);
     return work;
@@ -172,10 +162,10 @@ class Rebuilder {
   }
 
  private:
-  bool build(const FramePositions& frame) {
+  bool build(const FrameOfShapes& frame) {
     for (std::size_t i = 0; i < frame.size(); ++i) {
-      if (!rebuilt_[i].build(frame[i], options_.threads)) return false;
-      views_[scene_.bending[i]] = rebuilt_[i].view();
+      if (!rebuilt_[i].build(frame[i].positions, options_.threads)) return false;
+      views_[frame[i].shape] = rebuilt_[i].view();
     }
     return true;
   }
@@ -224,15 +214,19 @@ std::uint64_t BendingScene::bending_triangles() const {
   return triangles;
 }
 
-std::optional<double> deform(Engine& engine, std::uint32_t shape, const Positions& positions,
-                             const std::string& path, std::uint32_t frame) {
+std::optional<double> deform(Engine& engine, const FrameOfShapes& frame, const std::string& path,
+                             std::uint32_t number) {
+  std::vector<BentShape> bent;
+  for (const auto& [shape, positions] : frame)
+    std::visit([&, s = shape](const auto& given) { bent.push_back({s, std::span(given)}); }, positions);
   try {
-    return std::visit([&](const auto& given) { return engine.deform(shape, std::span(given)); }, positions);
+    return engine.deform(bent);
   } catch (const EngineError& error) {
+    if (!error.shape) throw;
     const std::string where =
         error.status == Status::kOutOfRange ? "vertex " + std::to_string(error.where) + ": " : "";
-    throw FileError(path + ": shape " + std::to_string(shape) + ", frame " + std::to_string(frame) + ": " +
-                    where + explain(error.status));
+    throw FileError(path + ": shape " + std::to_string(*error.shape) + ", frame " + std::to_string(number) +
+                    ": " + where + explain(error.status));
   }
 }
 
@@ -250,7 +244,7 @@ std::vector<PeerFrames> measure_frames(const BendingScene& scene, const DeformOp
     results.push_back({others.back()->engine().label(), others.back()->engine().settings(), {}});
   }
   for (std::uint32_t number = 0; number < options.frames; ++number) {
-    const FramePositions frame = read_frame(scene, number);
+    const FrameOfShapes frame = read_frame(scene, number);
     const std::span<const ObjectPair> given =
         scene.given_pairs != nullptr ? std::span(*scene.given_pairs) : std::span<const ObjectPair>();
     if (number == 0) tandem.follow(frame, number);  // makes the copies of the trees

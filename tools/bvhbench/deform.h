@@ -24,10 +24,17 @@ struct BendingScene {
   std::uint64_t bending_triangles() const;
 };
 
-/// Gives a shape of an engine the positions of a frame of the file at `path`. Result: that of
+/// A shape that bends, and its positions in a frame.
+struct ShapeInFrame {
+  std::uint32_t shape;
+  Positions positions;
+};
+using FrameOfShapes = std::vector<ShapeInFrame>;
+
+/// Gives the shapes of an engine their positions in frame `number` of the file at `path`. Result: that of
 /// Engine::deform(). Throws FileError where they cannot be taken.
-std::optional<double> deform(Engine& engine, std::uint32_t shape, const Positions& positions,
-                             const std::string& path, std::uint32_t frame);
+std::optional<double> deform(Engine& engine, const FrameOfShapes& frame, const std::string& path,
+                             std::uint32_t number);
 
 /// What a peer did of a frame. Seconds are the least of the repeats; a query is asked once before it is
 /// timed. On a GPU its own clock tells them, and the query is a graph of the broad phase and the contacts.

@@ -83,10 +83,10 @@ void bend(Engine& engine, const QueryArguments& arguments, const LoadedScene& sc
     throw UsageError(arguments.scene + ": has " + std::to_string(deformations.frames()) +
                      " frames, so there is no frame " + std::to_string(*arguments.frame));
   }
-  for (const std::uint32_t shape : deformations.shapes()) {
-    const Positions positions = deformations.read(shape, *arguments.frame);
-    deform(engine, shape, positions, arguments.scene, *arguments.frame);
-  }
+  FrameOfShapes frame;
+  for (const std::uint32_t shape : deformations.shapes())
+    frame.push_back({shape, deformations.read(shape, *arguments.frame)});
+  deform(engine, frame, arguments.scene, *arguments.frame);
 }
 
 // Runs the query as often as asked; the answer is the last run's, which is every run's.

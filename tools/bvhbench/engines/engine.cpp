@@ -108,6 +108,21 @@ std::span<const ObjectPair> Engine::find_pairs_and_query() {
   return pairs;
 }
 
+std::optional<double> Engine::deform(std::span<const BentShape> bent) {
+  std::optional<double> loosest;
+  for (const auto& [shape, positions] : bent) loosest = std::max(loosest, deform_one(shape, positions));
+  return loosest;
+}
+
+void Engine::require_bent(std::uint32_t shape, Status status, std::uint64_t where) const {
+  try {
+    require(status, where);
+  } catch (EngineError& error) {
+    error.shape = shape;
+    throw;
+  }
+}
+
 void Engine::require(Status status, std::uint64_t where) const {
   if (status == Status::kOk) return;
   if (status == Status::kOutOfMemory) throw std::bad_alloc();

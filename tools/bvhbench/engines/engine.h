@@ -50,6 +50,12 @@ struct TriangleContact {
 /// Positions of the source vertices of a shape, x y z of each, as Scene::deform() takes them.
 using VertexPositions = std::variant<std::span<const float>, std::span<const double>>;
 
+/// A shape whose source vertices get other positions.
+struct BentShape {
+  std::uint32_t shape;
+  VertexPositions positions;
+};
+
 /// The contacts that a step of a simulation asks for. Every exact engine gives the same list, whatever its
 /// threads.
 struct ContactList {
@@ -147,6 +153,7 @@ struct EngineError : std::runtime_error {
 
   Status status;
   std::uint64_t where;  ///< the body or pair to blame, where subject(status) names one of these
+  std::optional<std::uint32_t> shape = {};  ///< the shape to blame that was given other positions
 };
 
 /// No GPU can be used, it has too little memory, or CUDA failed.
@@ -199,14 +206,13 @@ class Engine {
   /// something for each body then start anew. `bodies` must stay until the next call.
   virtual void update(std::span<const BodyPose> bodies) = 0;
 
-  /// Gives the source vertices of a shape other positions, in the file's coordinates. Its bodies take the
-  /// shape of the triangles between these, where they stand. Result: how loose the tree has become, as
-  /// Scene::looseness() says; nothing where the library does not tell. An engine on a GPU takes float32
-  /// numbers alone, and puts the seconds of the refit, by the GPU's clock and without the copy of the
-  /// positions, into times().update. Condition: update(). Throws EngineError as Scene::deform() fails.
-  virtual std::optional<double> deform(std::uint32_t /*shape*/, const VertexPositions& /*positions*/) {
-    cannot("deform shapes");
-  }
+  /// Gives the source vertices of shapes other positions, in the file's coordinates. Their bodies take the
+  /// shape of the triangles between these, where they stand. Result: how loose the loosest tree has become,
+  /// as Scene::looseness() says; nothing where the library does not tell. An engine on a GPU takes float32
+  /// numbers alone, and puts the seconds of the one call that refits all, by the GPU's clock and without the
+  /// copy of the positions, into times().update. Condition: update(). Throws EngineError as Scene::deform()
+  /// fails, with the shape.
+  virtual std::optional<double> deform(std::span<const BentShape> bent);
 
   /// Says how the bodies of the next update() move in a step of `duration` seconds, for impacts. `motion`
   /// must stay as long as they. Conditions: there is one for each of them; duration > 0; for engines that are
@@ -311,8 +317,15 @@ class Engine {
   /// Throws std::logic_error. what: was asked of an engine that was not made for it.
   [[noreturn]] void cannot(const char* what) const;
 
+  /// Deforms a shape, as deform() does.
+  virtual std::optional<double> deform_one(std::uint32_t /*shape*/, const VertexPositions& /*positions*/) {
+    cannot("deform shapes");
+  }
+
   /// Throws what a status other than kOk calls for. `where`: the body to blame, where there is one.
   void require(Status status, std::uint64_t where) const;
+  /// Does the same for a shape that was given other positions.
+  void require_bent(std::uint32_t shape, Status status, std::uint64_t where) const;
 
   EngineTimes times_;
   ContactCounters counters_;

@@ -66,7 +66,7 @@ void GpuEngine::stage(const Elements& elements, StagedArray<Element>& array, con
 void GpuEngine::set_shapes(std::span<const AssetView> shapes) {
   Stopwatch watch;
   shapes_.clear();
-  deforming_.clear();
+  deforming_ = {};
   check(uploaded_.upload(shapes, needs_.contents, stream()), uploaded_.cuda_error(), "assets");
   for (std::size_t i = 0; i < shapes.size(); ++i) {
     const std::size_t levels = needs_.all_levels ? shapes[i].levels.size() : 1;
@@ -99,34 +99,52 @@ void GpuEngine::update(std::span<const BodyPose> bodies) {
   upload_of_bodies_ = watch.lap();
 }
 
-// Returns the shape as one that deforms, with these positions on the GPU. The first such shape gives all
-// shapes records, which the query follows from then on.
-DeformingShape& GpuEngine::deforming(std::uint32_t shape, std::span<const float> positions) {
-  const auto [found, is_new] = deforming_.try_emplace(shape);
-  DeformingShape& of = found->second;
-  stage(positions, of.positions, "positions", std::identity());
-  if (!is_new) return of;
-  const float* const place[] = {of.positions.on_gpu.data()};
-  stage(std::span(place), of.place, "positions", std::identity());
-  if (deforming_.size() == 1) check(list_.set(shapes_, stream()), cudaSuccess, "deformed shapes");
-  const Status status = of.deformer.begin(shapes_, std::span(&shape, 1), list_.records(), stream());
-  check(status, of.deformer.cuda_error(), "deformed shapes");
-  of.refit = captured([this, &of] {
-    check(of.deformer.enqueue(of.place.on_gpu.data(), stream()), of.deformer.cuda_error(), "refit");
-  });
-  name_shapes();
-  return of;
+// Returns the positions, as many as the shape takes, or throws.
+std::span<const float> GpuEngine::checked(const BentShape& bent) const {
+  const auto& [shape, positions] = bent;
+  if (!std::holds_alternative<std::span<const float>>(positions))
+    require_bent(shape, Status::kNotFloat32, shape);
+  const auto given = std::get<std::span<const float>>(positions);
+  if (shapes_[shape].tree.source_vertices == nullptr) require_bent(shape, Status::kNoSourceVertices, shape);
+  if (given.size() != 3 * shapes_[shape].source_vertices)
+    require_bent(shape, Status::kVertexCountMismatch, shape);
+  return given;
 }
 
-std::optional<double> GpuEngine::deform(std::uint32_t shape, const VertexPositions& positions) {
+// Gives all shapes records, as the file has them, which the query follows from then on, and names those that
+// deform. Condition: their positions and places are on the GPU.
+void GpuEngine::begin_deforming() {
+  check(list_.set(shapes_, stream()), cudaSuccess, "deformed shapes");
+  std::vector<std::uint32_t> numbers;
+  for (const auto& [shape, positions] : deforming_.positions) numbers.push_back(shape);
+  GpuDeformer& deformer = deforming_.deformer;
+  check(deformer.begin(shapes_, numbers, list_.records(), stream()), deformer.cuda_error(),
+        "deformed shapes");
+  deforming_.refit = captured([this, &deformer] {
+    check(deformer.enqueue(deforming_.places.on_gpu.data(), stream()), deformer.cuda_error(), "refit");
+  });
+  name_shapes();
+}
+
+// Where there is a new shape, all that deform are given their positions once more.
+std::optional<double> GpuEngine::deform(std::span<const BentShape> bent) {
   if (needs_.all_levels || needs_.finds_pairs) cannot("deform shapes");
-  if (!std::holds_alternative<std::span<const float>>(positions)) require(Status::kNotFloat32, shape);
-  const auto given = std::get<std::span<const float>>(positions);
-  if (shapes_[shape].tree.source_vertices == nullptr) require(Status::kNoSourceVertices, shape);
-  if (given.size() != 3 * shapes_[shape].source_vertices) require(Status::kVertexCountMismatch, shape);
-  DeformingShape& of = deforming(shape, given);
-  times_.update = time_repeats(1, of.refit).front();
-  require(of.deformer.report().status, of.deformer.report().where);
+  bool is_new = false;
+  for (const BentShape& each : bent) {
+    const std::span<const float> given = checked(each);
+    const auto [found, is_new_here] = deforming_.positions.try_emplace(each.shape);
+    is_new = is_new || is_new_here;
+    stage(given, found->second, "positions", std::identity());
+  }
+  stage(deforming_.positions, deforming_.places, "positions", [&](const auto& of) -> const float* {
+    const auto is_it = [&](const BentShape& each) { return each.shape == of.first; };
+    return is_new || std::any_of(bent.begin(), bent.end(), is_it) ? of.second.on_gpu.data() : nullptr;
+  });
+  if (is_new) begin_deforming();
+  times_.update = time_repeats(1, deforming_.refit).front();
+  const GpuDeformReport& report = deforming_.deformer.report();
+  if (report.status != Status::kOk)
+    require_bent(std::next(deforming_.positions.begin(), report.body)->first, report.status, report.where);
   return {};
 }
 
@@ -155,7 +173,7 @@ const PairFilter& GpuEngine::upload_filter() {
 }
 
 GpuAssetBounds GpuEngine::bounds() const {
-  if (!deforming_.empty()) return list_.records().bounds_of_all();
+  if (!deforming_.positions.empty()) return list_.records().bounds_of_all();
   return {bounds_.on_gpu.data(), bounds_count_};
 }
 

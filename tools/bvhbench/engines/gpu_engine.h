@@ -33,12 +33,12 @@ struct StagedArray {
   }
 };
 
-/// A shape that deforms, and where its positions lie.
-struct DeformingShape {
+/// The shapes that deform, and where their positions lie.
+struct DeformingShapes {
   GpuDeformer deformer;
-  StagedArray<float> positions;
-  StagedArray<const float*> place;
-  std::function<void()> refit;  ///< queues the call
+  std::map<std::uint32_t, StagedArray<float>> positions;  ///< by shape
+  StagedArray<const float*> places;                       ///< of these, null where a shape stays as it is
+  std::function<void()> refit;                            ///< queues the call
 };
 
 /// Says what a question on a GPU takes of a scene.
@@ -54,7 +54,7 @@ class GpuEngine : public Engine {
  public:
   void set_shapes(std::span<const AssetView> shapes) final;
   void update(std::span<const BodyPose> bodies) final;
-  std::optional<double> deform(std::uint32_t shape, const VertexPositions& positions) final;
+  std::optional<double> deform(std::span<const BentShape> bent) final;
   void keep_fixed() final;
   std::span<const ObjectPair> find_pairs() final;
 
@@ -66,7 +66,7 @@ class GpuEngine : public Engine {
   std::span<const GpuAsset> shapes() const { return shapes_; }
   const GpuInstances& instances() const { return instances_; }
   /// The records of shapes() that a query follows; null where none ever deformed.
-  const GpuAsset* records() const { return deforming_.empty() ? nullptr : list_.records().assets; }
+  const GpuAsset* records() const { return deforming_.positions.empty() ? nullptr : list_.records().assets; }
   const RigidMotion* motion_on_gpu() const { return motions_.on_gpu.data(); }
 
   /// Throw what a call that failed calls for. `step`: what was done.
@@ -123,7 +123,8 @@ class GpuEngine : public Engine {
 
  private:
   GpuAssetBounds bounds() const;
-  DeformingShape& deforming(std::uint32_t shape, std::span<const float> positions);
+  std::span<const float> checked(const BentShape& bent) const;
+  void begin_deforming();
   GpuBroadPhaseOptions broad_phase_options(bool sorted) const;
   template <typename Elements, typename Element, typename Get>
   void stage(const Elements& elements, StagedArray<Element>& array, const char* step, const Get& get);
@@ -139,8 +140,8 @@ class GpuEngine : public Engine {
   std::vector<GpuAsset> shapes_;
   std::uint32_t bounds_count_ = 0;
   StagedArray<AssetBounds> bounds_;
-  GpuAssetList list_;                                  // once a shape deforms
-  std::map<std::uint32_t, DeformingShape> deforming_;  // by shape
+  GpuAssetList list_;  // once a shape deforms
+  DeformingShapes deforming_;
   StagedArray<std::uint32_t> shape_of_, pair_count_;
   StagedArray<Pose> poses_;
   StagedArray<RigidMotion> motions_;

@@ -47,7 +47,7 @@ LibraryEngine::MovingVertices& LibraryEngine::moving_vertices(std::uint32_t shap
   MovingVertices& moving = moving_[shape];
   if (!moving.source.empty()) return moving;
   const LevelView level = shapes_[shape].level();
-  if (level.source_vertices == nullptr) require(Status::kNoSourceVertices, shape);
+  if (level.source_vertices == nullptr) require_bent(shape, Status::kNoSourceVertices, shape);
   const IndexedMesh mesh(level);
   moving.source.resize(mesh.vertex_count());
   moving.position.resize(mesh.vertices.size());
@@ -58,12 +58,12 @@ LibraryEngine::MovingVertices& LibraryEngine::moving_vertices(std::uint32_t shap
   return moving;
 }
 
-std::optional<double> LibraryEngine::deform(std::uint32_t shape, const VertexPositions& positions) {
+std::optional<double> LibraryEngine::deform_one(std::uint32_t shape, const VertexPositions& positions) {
   MovingVertices& moving = moving_vertices(shape);
   std::visit(
       [&](const auto& given) {
         if (given.size() != 3 * shapes_[shape].header->source_vertices)
-          require(Status::kVertexCountMismatch, given.size() / 3);
+          require_bent(shape, Status::kVertexCountMismatch, given.size() / 3);
         double* position = moving.position.data();
         for (const std::uint32_t source : moving.source)
           position = std::copy_n(&given[3 * std::size_t{source}], 3, position);

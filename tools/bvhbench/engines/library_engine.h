@@ -30,7 +30,6 @@ class LibraryEngine : public Engine {
 
   void set_shapes(std::span<const AssetView> shapes) final;
   void update(std::span<const BodyPose> bodies) final;
-  std::optional<double> deform(std::uint32_t shape, const VertexPositions& positions) final;
   std::span<const ObjectPair> find_pairs() final;
   void query(std::span<const ObjectPair> pairs) override;
   bool contacts(std::vector<TriangleContact>& found) override;
@@ -39,6 +38,8 @@ class LibraryEngine : public Engine {
   std::vector<Counter> named_counters() const override { return {{"candidates", candidates_}}; }
 
  protected:
+  std::optional<double> deform_one(std::uint32_t shape, const VertexPositions& positions) final;
+
   /// Forgets all shapes.
   virtual void clear_shapes() = 0;
 

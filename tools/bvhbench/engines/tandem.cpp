@@ -29,12 +29,14 @@ class TandemEngine : public Engine {
     placed_ = false;
   }
 
-  std::optional<double> deform(std::uint32_t shape, const VertexPositions& positions) override {
-    check(std::visit([&](const auto& given) { return scene_.deform(shape, given); }, positions));
+ protected:
+  std::optional<double> deform_one(std::uint32_t shape, const VertexPositions& positions) override {
+    const Status status =
+        std::visit([&](const auto& given) { return scene_.deform(shape, given); }, positions);
+    require_bent(shape, status, scene_.where());
     return scene_.looseness(shape);
   }
 
- protected:
   void check(Status status) const { require(status, scene_.where()); }
 
   // The bodies are not placed in update(), because the filter may be set after it.

@@ -309,7 +309,7 @@ class Scene {
   std::unique_ptr<tandem_scene, decltype(&tandem_scene_destroy)> scene_{nullptr, tandem_scene_destroy};
   std::atomic<bool> busy_ = false;
   std::vector<tandem_pose> configurations_;  // the memory is kept, since new pages cost as much as the copy
-  bool contacts_asked_ = false;  // since bodies were last changed
+  bool contacts_asked_ = false;              // since bodies were last changed
 };
 
 }  // namespace

@@ -146,3 +146,29 @@ def test_assets_may_go_before_scenes_and_scenes_before_arrays(scene):
     gc.collect()
     assert found.contacts.tolist() == scene.place(translation=[[0, 0, 0], [0.5, 0.5, 0.5]]).contacts().contacts.tolist()
     found.contacts["pair"] = 7  # arrays are the caller's
+
+
+def test_configurations_take_poses_as_they_are():
+    """Matrices, rotations with translations, and poses of both shapes, of float64 or not, say the same."""
+    box = tandem.build(BOX_VERTICES, BOX_FACES)
+    scene = tandem.Scene([box], translation=[[0, 0, 0], [3, 0, 0], [5, 0, 0]])
+    random = np.random.default_rng(8)
+    rotation, translation = tandem.rotations(xyzw=random.normal(size=(400, 4))).reshape(200, 2, 3, 3), random.uniform(-2, 3, (200, 2, 3))
+    pose = np.concatenate([rotation, translation[:, :, None]], axis=2)
+    transform = np.tile(np.eye(4), (200, 2, 1, 1))
+    transform[..., :3, :3], transform[..., :3, 3] = rotation, translation
+    expected = scene.configurations([1, 2], rotation=rotation, translation=translation, all_pairs=True)
+    assert 0 < expected.touching.sum() < 200
+    for given in ({"pose": pose}, {"pose": pose.reshape(200, 2, 12)}, {"pose": np.asfortranarray(pose)}, {"transform": transform}, {"transform": transform.tolist()}):
+        found = scene.configurations([1, 2], **given, all_pairs=True)
+        assert np.array_equal(found.pairs, expected.pairs) and np.array_equal(found.touching, expected.touching)
+    with pytest.raises(TypeError, match="pose stands instead"):
+        scene.configurations([1, 2], pose=pose, translation=translation)
+    with pytest.raises(ValueError, match="pose has shape"):
+        scene.configurations([1, 2], pose=pose[..., :2])
+    with pytest.raises(TypeError, match="pose has <U1"):
+        scene.configurations([1], pose=np.full((1, 1, 4, 3), "a"))
+    pose[7, 1, 0, 0] = np.nan
+    with pytest.raises(tandem.Error, match="not finite") as caught:
+        scene.configurations([1, 2], pose=pose)
+    assert caught.value.where == 15

@@ -271,6 +271,31 @@ def test_manifolds_and_contained_bodies_are_those_of_the_cpu(torch, assets):
 
 
 @needs_gpu
+def test_queued_manifolds_are_those_of_the_cpu(torch, assets):
+    asset, pose = make_scene()
+    query, on_cpu = cuda.Query(assets), tandem.Scene(assets)
+    found, made = on_cpu.place(cpu_instances(asset, pose)).contacts(), on_cpu.manifolds(match_previous=False)
+    bodies = query.instances(torch.from_numpy(asset).cuda(), torch.from_numpy(pose).cuda())
+    room = {"instances": len(asset), "pairs": len(found.pairs), "contacts": len(found.contacts), "sorted": True, "grouped": True, "match_previous": False}
+    with pytest.raises(ValueError, match="grouped"):
+        query.reserve(**room | {"grouped": False}, manifolds=1)
+    query.reserve(**room)
+    with pytest.raises(ValueError, match="no room for manifolds"):
+        query.enqueue(bodies).manifolds
+    query.reserve(**room, manifolds=1, points=1)
+    with pytest.raises(cuda.TooLittleRoom) as caught:
+        query.enqueue(bodies).wait()
+    assert caught.value.manifolds >= len(made.manifolds) and caught.value.points >= len(made.points)
+    query.reserve(**room, manifolds=caught.value.manifolds, points=caught.value.points)
+    queued = query.enqueue(bodies)
+    assert queued.wait() == (len(found.pairs), len(found.contacts))
+    report = queued.manifold_report.numpy()[0]
+    assert report["complete"] and (report["manifolds"], report["points"]) == (len(made.manifolds), len(made.points))
+    assert queued.manifolds.numpy()[:len(made.manifolds)].tobytes() == made.manifolds.tobytes()
+    assert queued.points.numpy()[:len(made.points)].tobytes() == made.points.tobytes()
+
+
+@needs_gpu
 def test_distances_impacts_and_verdicts(torch, assets):
     asset, pose = make_scene()
     query, on_cpu, instances = cuda.Query(assets), tandem.Scene(assets), cpu_instances(asset, pose)

@@ -25,8 +25,8 @@ def asked_pairs(allowed: _Whole, is_mesh: NDArray[np.bool_], world: _Whole | Non
     if 2 * len(allowed) < _count(is_mesh, of):
         return np.unique(np.asarray(allowed, np.uint32), axis=0), None
     candidates = _candidates(is_mesh, of)
-    keys = (pairs[:, 0] * len(is_mesh) + pairs[:, 1] for pairs in (candidates, np.asarray(allowed, np.int64)))
-    excluded = candidates[~np.isin(*keys)]
+    keys, allowed_keys = (pairs[:, 0] * len(is_mesh) + pairs[:, 1] for pairs in (candidates, np.asarray(allowed, np.int64)))
+    excluded = candidates[~np.isin(keys, allowed_keys)]
     columns: dict[str, Any] = {"group": np.where(is_mesh, 1, 2).astype(np.uint32), "mask": np.where(is_mesh, 3, 1).astype(np.uint32),
                                "excluded": excluded.astype(np.uint32)}
     if world is not None:
@@ -54,5 +54,6 @@ def _candidates(is_mesh: NDArray[np.bool_], world: NDArray[np.int64]) -> NDArray
     for size in np.unique(sizes):
         places = np.stack(np.triu_indices(size, 1), axis=1)
         found.append(bodies[(first[sizes == size, None, None] + places).reshape(-1, 2)])
-    pairs = np.sort(np.concatenate(found), axis=1)
-    return pairs[is_mesh[pairs].any(axis=1)]
+    pairs: NDArray[np.int64] = np.sort(np.concatenate(found), axis=1)
+    with_mesh: NDArray[np.int64] = pairs[is_mesh[pairs].any(axis=1)]
+    return with_mesh

@@ -1,4 +1,6 @@
 """The doors to Newton and MuJoCo Warp share this: contact points of bodies whose poses lie in an array of Warp, on a CPU or a GPU."""
+# Kernels are functions of Warp's language, and its decorators have no types where it is not installed.
+# mypy: disable-error-code="untyped-decorator, no-untyped-def"
 from __future__ import annotations
 
 from typing import Any

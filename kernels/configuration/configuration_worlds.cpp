@@ -7,7 +7,7 @@ namespace tandem {
 namespace {
 
 // Bodies that move in one question: 100 MB of poses.
-constexpr std::size_t kBodiesAtOnce = std::size_t{1} << 20;
+constexpr std::size_t kBodiesInQuestion = std::size_t{1} << 20;
 
 // A version that the bodies of no scene have, since these count from 0.
 std::uint64_t next_version() {
@@ -124,7 +124,7 @@ Status ConfigurationWorlds::find(SceneState& scene, const ConfigurationOptions& 
       return scene.fail(Status::kOutOfMemory, 0);
   }
   const std::size_t n = options.bodies.size(), count = n == 0 ? 0 : options.poses.size() / n;
-  const std::size_t at_once = std::max<std::size_t>(1, kBodiesAtOnce / std::max<std::size_t>(1, n));
+  const std::size_t at_once = std::max<std::size_t>(1, kBodiesInQuestion / std::max<std::size_t>(1, n));
   scene.device->allocator = current_allocator();
   fixed_kept_ = false;
   scene.forget_fixed_on_device();

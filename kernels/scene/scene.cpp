@@ -12,9 +12,6 @@
 namespace tandem {
 namespace {
 
-// Bodies that a worker poses at a time: some microseconds of work.
-constexpr std::size_t kBodiesAtOnce = 64;
-
 // Whether a body that was placed, and not removed, stands as another instance says.
 bool stands_so(const Instance& x, const Instance& y) {
   return x.asset != kNoIndex && x.asset == y.asset && std::memcmp(&x.pose, &y.pose, sizeof(Pose)) == 0;

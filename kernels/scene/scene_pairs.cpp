@@ -11,9 +11,6 @@ namespace {
 // Near pairs that a thread looks at at a time.
 constexpr std::size_t kNearAtOnce = 4096;
 
-// Bodies that a worker takes at a time.
-constexpr std::size_t kBodiesAtOnce = 64;
-
 // So many bodies, or fewer, are tested against all, without a tree; or one of so many where there is one.
 constexpr std::size_t kFewChanged = 16, kBodiesForOneChanged = 32;
 

@@ -20,6 +20,9 @@
 // The state of a scene, as questions see it.
 namespace tandem {
 
+/// Bodies that a worker takes at a time: some microseconds of work.
+inline constexpr std::size_t kBodiesAtOnce = 64;
+
 /// An asset as questions look at it: the first level that its view shows.
 struct SceneAsset {
   AssetView view;

@@ -88,7 +88,7 @@ class ExactRay {
   TANDEM_HD ExactRay(const double* origin, const double* direction, const RayUnits& units)
       : origin_(origin), units_(units), n_(units.words() < 2 ? 2 : units.words()) {
     for (int k = 0; k < 3; ++k) d_.x[k].assign_difference(direction[k], 0, units.direction.unit, n_);
-    one_.assign_difference(1, 0, -52, 2);
+    one_.assign(std::uint64_t{1} << 52);
   }
 
   /// Finds the first parameter at which the ray meets a triangle, and where: the weights of corners 1 and 2.
@@ -291,7 +291,8 @@ TANDEM_OUT_OF_LINE TANDEM_HD inline int compare_meetings(const double* origin, c
   return WideNumber<kWords, 6>::compare_magnitudes(left, right);
 }
 
-/// Compares where a ray first meets a triangle, which it does, with a finite parameter: the sign of t - last.
+/// Compares where a ray first meets a triangle, which it does, with a finite parameter that is not negative:
+/// the sign of t - last.
 template <int kWords>
 TANDEM_OUT_OF_LINE TANDEM_HD inline int compare_with(const double* origin, const double* direction,
                                                      const double (&corner)[3][3], const RayUnits& units,
@@ -300,14 +301,14 @@ TANDEM_OUT_OF_LINE TANDEM_HD inline int compare_with(const double* origin, const
   RayTime<kWords> time;
   double weight[2];
   ray.find(corner, time, weight);
-  detail::ExponentRange of_last;
-  of_last.include(last);
   if (last == 0) return time.numerator.sign();
+  // Of assign_difference() with a constant 0 and number of words, nvcc 13 makes twice the number.
+  const detail::Magnitude of_last = detail::magnitude(last);
   WideNumber<kWords, 1> factor;
   WideNumber<kWords, 4> right;
-  factor.assign_difference(last, 0, of_last.unit, 2);
+  factor.assign(of_last.significand);
   right.assign_product(factor, time.denominator);
-  return compare_scaled(time.numerator, units.exponent() - of_last.unit, right);
+  return compare_scaled(time.numerator, units.exponent() - of_last.exponent, right);
 }
 
 }  // namespace tandem::exact

@@ -39,6 +39,15 @@ class WideNumber {
     trim();
   }
 
+  TANDEM_HD void assign(std::uint64_t significand) {
+    static_assert(kCapacity >= 2);
+    word_[0] = static_cast<std::uint32_t>(significand);
+    word_[1] = static_cast<std::uint32_t>(significand >> 32);
+    negative_ = false;
+    size_ = 2;
+    trim();
+  }
+
   /// Neither factor is this number.
   template <int kX, int kY>
   TANDEM_HD void assign_product(const WideNumber<kWords, kX>& x, const WideNumber<kWords, kY>& y) {

@@ -380,7 +380,9 @@ TEST(Deform, ErrorsChangeNothing) {
 std::uint64_t block_pairs(const AssetView& view, const std::vector<float>* positions, double& looseness) {
   Scene scene;
   EXPECT_EQ(scene.set_assets({{view}}), Status::kOk);
-  if (positions != nullptr) EXPECT_EQ(scene.deform(0, *positions), Status::kOk);
+  if (positions != nullptr) {
+    EXPECT_EQ(scene.deform(0, *positions), Status::kOk);
+  }
   looseness = scene.looseness(0);
   Pose beside = kIdentityPose;
   beside.translation[0] = 0.11, beside.translation[1] = 0.07, beside.translation[2] = 0.05;

@@ -157,10 +157,10 @@ def test_configurations_take_poses_as_they_are():
     pose = np.concatenate([rotation, translation[:, :, None]], axis=2)
     transform = np.tile(np.eye(4), (200, 2, 1, 1))
     transform[..., :3, :3], transform[..., :3, 3] = rotation, translation
-    expected = scene.configurations([1, 2], rotation=rotation, translation=translation, all_pairs=True)
+    expected = scene.configurations([1, 2], rotation=rotation, translation=translation, pairs="all")
     assert 0 < expected.touching.sum() < 200
     for given in ({"pose": pose}, {"pose": pose.reshape(200, 2, 12)}, {"pose": np.asfortranarray(pose)}, {"transform": transform}, {"transform": transform.tolist()}):
-        found = scene.configurations([1, 2], **given, all_pairs=True)
+        found = scene.configurations([1, 2], **given, pairs="all")
         assert np.array_equal(found.pairs, expected.pairs) and np.array_equal(found.touching, expected.touching)
     with pytest.raises(TypeError, match="pose stands instead"):
         scene.configurations([1, 2], pose=pose, translation=translation)

@@ -111,7 +111,7 @@ std::uint64_t wanted_bytes(const AssetView& view, Contents contents) {
     if (contents == Contents::exact_queries) continue;
     bytes +=
         level.triangle_count * sizeof(TriangleTopology) + level.component_count * sizeof(SurfaceComponent);
-    bytes += (level.vertex_count + level.block_count) * sizeof(std::uint32_t);
+    bytes += level.vertex_count * sizeof(std::uint32_t);
   }
   return bytes;
 }

@@ -1,7 +1,7 @@
 #pragma once
 #include "kernels/distance/nearest_phase.h"
 
-// How a thread finds the distance of one object pair, step by step, and what it keeps from pair to pair.
+// A thread finds the distance of one object pair step by step, and keeps its memory from pair to pair.
 namespace tandem {
 
 /// Two triangles; those with which a search begins, or none.

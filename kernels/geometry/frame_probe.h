@@ -21,7 +21,7 @@ TANDEM_HD inline float lesser(float x, float y) {
 #endif
 }
 
-/// What tests of boxes need of a ray.
+/// The part of a ray that tests of boxes need.
 template <typename Value>
 struct RayInFrame {
   Value o[3], inverse[3], size[3], slack;

@@ -171,7 +171,7 @@ TANDEM_HD inline bool find_surely(const Volumes& v, Meeting& out) {
 /// Says what one stage knows.
 enum class Answer : std::uint8_t { no, yes, unsure };
 
-/// Whether a ray meets a triangle, and where first, as far as float64 is sure. v: as of volumes_of().
+/// Says whether a ray meets a triangle, and where first, as far as float64 is sure. v: as of volumes_of().
 TANDEM_HD inline Answer find_by_float64(const Volumes& v, Meeting& out) {
   int most = 0, least = 0, unsure = 0;
   for (int i = 0; i < 3; ++i) {
@@ -208,7 +208,7 @@ TANDEM_HD inline bool find_meeting(const double (&origin)[3], const double (&dir
   return (height > 0 && find_surely(v, out)) || find_exactly<kWords>(origin, direction, corner, out);
 }
 
-/// Whether a meeting, which there is, lies at most at a parameter, as far as float64 is sure.
+/// Says whether a meeting, which there is, lies at most at a parameter, as far as float64 is sure.
 TANDEM_HD inline Answer is_within_by_float64(const Meeting& meeting, double last) {
   if (meeting.t.upper <= last) return Answer::yes;
   return meeting.t.lower <= last ? Answer::unsure : Answer::no;
@@ -229,7 +229,7 @@ struct FoundHit {
   std::uint32_t body, triangle;
 };
 
-/// Whether a hit comes before another one, as far as float64 is sure.
+/// Says whether a hit comes before another one, as far as float64 is sure.
 TANDEM_HD inline Answer comes_before_by_float64(const FoundHit& x, const FoundHit& y) {
   if (x.meeting.t.upper < y.meeting.t.lower) return Answer::yes;
   return y.meeting.t.upper < x.meeting.t.lower ? Answer::no : Answer::unsure;

@@ -6,7 +6,7 @@
 #include "tandem/formats/platform.h"
 #include "tandem/kernels/world_box.h"
 
-/// What walks by points and rays do before and beside the trees of bodies, for CPU and GPU.
+/// Walks by points and rays do this before and beside the trees of bodies, for CPU and GPU.
 namespace tandem::probe {
 
 /// Walks a tree by world boxes in float64, of a body that float32 cannot take. wanted(box) -> whether what is
@@ -37,7 +37,7 @@ TANDEM_HD inline bool is_in_range(const double* point) {
   return in_range;
 }
 
-/// How far a point is from a box at least.
+/// Bounds from below how far a point is from a box.
 TANDEM_HD inline double distance_to(const WorldBox& box, const double (&p)[3]) {
   double largest = 0, square = 0;
   for (int k = 0; k < 3; ++k) {
@@ -50,7 +50,7 @@ TANDEM_HD inline double distance_to(const WorldBox& box, const double (&p)[3]) {
   return (largest < 0x1p500 && largest > 0x1p-500 ? std::sqrt(square) : largest) * (1 - 0x1p-50);
 }
 
-/// Whether the ray of inside_test.h may meet a box.
+/// Says whether the ray of inside_test.h may meet a box.
 TANDEM_HD inline bool may_cross(const WorldBox& box, const double (&p)[3]) {
   return box.lo[1] <= p[1] && p[1] <= box.hi[1] && box.lo[2] <= p[2] && p[2] <= box.hi[2] &&
          p[0] <= box.hi[0];

@@ -8,7 +8,7 @@ namespace {
 
 constexpr std::uint32_t kThreads = 128;
 
-/// What the ray from a point crosses of a body.
+/// Counts what the ray from a point crosses of a body.
 struct Crossings {
   const ProbedBody& body;
   const ProbedSurface& surface;

@@ -109,7 +109,7 @@ struct RayArgs : ProbeArgs {
   GpuRayReport* host_report;  ///< in CPU memory
   RayHit* rows;
 
-  // Where all hits are asked for.
+  // These are for all hits alone.
   ListedHit *listed, *ordered;
   std::uint32_t *hits_of, *first_hit, *placed, *by_exact;  ///< of each ray
 };

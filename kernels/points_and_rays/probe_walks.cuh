@@ -9,7 +9,7 @@
 namespace tandem::gpu {
 namespace {
 
-/// What waits to be visited: on each level three nodes beside the one that is taken next.
+/// The nodes that wait to be visited: on each level three beside the one that is taken next.
 struct WaitingBlock {
   std::uint32_t block;
   float near;

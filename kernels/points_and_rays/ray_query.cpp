@@ -115,7 +115,7 @@ Status check(SceneState& scene, const RayOptions& options) {
   return Status::kOk;
 }
 
-// What a thread has for the rays that it answers.
+// A thread has this for the rays that it answers.
 struct RayWorker {
   ProbeOrder order;
   RaySearch searches[kRaysAtOnce];

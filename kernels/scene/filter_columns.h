@@ -9,7 +9,7 @@
 
 namespace tandem {
 
-/// What a filter says of each body of a scene. A column is empty where all bodies have the usual entry.
+/// A column of a filter has an entry for each body of a scene, or none where all have the usual one.
 struct FilterColumns {
   Buffer<Motion> motion;
   Buffer<std::uint32_t> group, mask, world;

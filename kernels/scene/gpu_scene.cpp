@@ -331,7 +331,7 @@ class Gpu final : public SceneDevice {
     on_gpu = room.data();
     return status;
   }
-  // What a question about points and rays looks at; null: all.
+  // The bodies at which a question about points and rays looks; null: all.
   const std::uint8_t* looked_at() const { return is_there_.size() != 0 ? is_there_on_gpu_.data() : nullptr; }
   static Status wait() { return status_of(cudaStreamSynchronize(kStream)); }
 

@@ -4,7 +4,7 @@
 #include "kernels/common/check_options.h"
 #include "kernels/scene/scene_state.h"
 
-// How a scene finds the pairs of its bodies whose boxes meet: all anew, or those of bodies that changed.
+// A scene finds the pairs of its bodies whose boxes meet: all anew, or those of bodies that changed.
 namespace tandem {
 namespace {
 
@@ -61,7 +61,7 @@ void SceneState::each_changed(const Visit& visit) const {
   }
 }
 
-// Whether it pays to look for the pairs of those that changed alone.
+// Says whether it pays to look for the pairs of those that changed alone.
 bool SceneState::few_changed() const {
   return changed_count_ <= std::max(kFewChanged, boxes.size() / kBodiesForOneChanged);
 }
@@ -139,8 +139,8 @@ Status SceneState::search_by_device() {
   return status;
 }
 
-// Whether the near pairs have all that meet; they are found anew where that pays. A caller may change the
-// excluded pairs in their place, so near ones may be excluded.
+// Says whether the near pairs have all that meet; they are found anew where that pays. A caller may change
+// the excluded pairs in their place, so near ones may be excluded.
 bool SceneState::near_pairs_hold(std::uint32_t workers) {
   if (found_of_.self_pairs || removed_ != 0) return false;
   if (near_.hold(asked_boxes())) return true;

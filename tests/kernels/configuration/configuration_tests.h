@@ -93,7 +93,7 @@ inline Rows by_distances(const Question& question, const PairFilter& filter, dou
   return rows;
 }
 
-/// Whether scenes of this kind can be made here.
+/// Says whether scenes of this kind can be made here.
 template <typename TheScene>
 bool can_be_made() {
   return true;

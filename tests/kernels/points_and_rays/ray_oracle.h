@@ -3,7 +3,7 @@
 
 namespace tandem {
 
-/// Whether a ray's line passes a triangle by, which CGAL's intervals prove; false: they do not.
+/// Returns whether CGAL's intervals prove that a ray's line passes a triangle by.
 bool surely_passes_by(const double* origin, const double* direction, const double (*corner)[3]);
 
 /// Where a ray first meets a triangle, by rational numbers: the least of all parameters at which the ray may

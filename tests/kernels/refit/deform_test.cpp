@@ -376,7 +376,7 @@ TEST(Deform, ErrorsChangeNothing) {
   EXPECT_EQ(query.rows().size(), before);
 }
 
-/// How many block pairs two such bodies look at that stand a little apart from each other.
+/// Counts the block pairs at which two such bodies look that stand a little apart from each other.
 std::uint64_t block_pairs(const AssetView& view, const std::vector<float>* positions, double& looseness) {
   Scene scene;
   EXPECT_EQ(scene.set_assets({{view}}), Status::kOk);

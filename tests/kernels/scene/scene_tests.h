@@ -30,7 +30,7 @@ inline Pairs pairs_of(const Scene& scene) {
   return out;
 }
 
-/// Whether scenes of this kind can be made here.
+/// Says whether scenes of this kind can be made here.
 template <typename TheScene>
 bool is_usable() {
   return true;

@@ -138,7 +138,7 @@ def test_any_number_of_workers_gives_the_same_bytes(workers, meshes, expected, s
     assert len(asked_once.contacts) > 10_000
     assert_same(found, asked_once)
     assert 0 < blocked.sum() < len(blocked) and blocked.tolist() == [len(rows) > 0 for rows in touching]
-    assert pairs.tolist() == [(number, *pair) for number, rows in enumerate(touching) for pair in rows]
+    assert pairs.tolist() == [(number, *pair, 0, 0) for number, rows in enumerate(touching) for pair in rows]
 
 
 @pytest.mark.parametrize("options", [{"within": 0.02}, {"first_contact_only": True}, {"self_pairs": True, "leave_out_rings": 1}, {"mode": "boxes"},

@@ -75,9 +75,9 @@ class CollisionPipeline:
         if len(self.shapes) == 0:
             return
         margin = values("shape_margin").astype(np.float64)[self.shapes]
-        world = values("shape_world")[self.shapes]
+        world = values("shape_world").astype(np.int64)[self.shapes]
         self._touches = Touches(self.assets, np.array(self._asset, np.uint32), np.searchsorted(self.shapes, np.sort(pairs[is_ours], axis=1)), kind[self.shapes] == _MESH,
-                                np.where(world < 0, tandem.EVERY_WORLD, world.astype(np.int64)), margin, threads=threads, most_points=most_points, device=model.device)
+                                np.where(world < 0, tandem.EVERY_WORLD, world), margin, threads=threads, most_points=most_points, device=model.device)
         transform = values("shape_transform").astype(np.float64)[self.shapes]
         inner = np.concatenate([tandem.rotations(xyzw=transform[:, 3:]).reshape(-1, 9), transform[:, :3]], axis=1)
         self._body, self._shape = (wp.array(of.astype(np.int32), dtype=int, device=model.device) for of in (values("shape_body")[self.shapes], self.shapes))

@@ -48,7 +48,7 @@ ConfigurationPair ConfigurationWorlds::row_of(const ConfigurationOptions& option
   const auto body = [&](std::size_t i) {
     return i < slice.count * n ? options.bodies[i % n] : standing_[i - slice.count * n];
   };
-  // Of two bodies one moves, and comes first.
+  // One of the two bodies moves, and it comes first.
   const std::uint32_t a = body(pair.a), b = body(pair.b);
   return {slice.first + pair.a / n, std::min(a, b), std::max(a, b), 0, options.within};
 }

@@ -302,7 +302,7 @@ TANDEM_OUT_OF_LINE TANDEM_HD inline int compare_with(const double* origin, const
   double weight[2];
   ray.find(corner, time, weight);
   if (last == 0) return time.numerator.sign();
-  // Of assign_difference() with a constant 0 and number of words, nvcc 13 makes twice the number.
+  // nvcc 13 compiles assign_difference() with a constant 0 and number of words to twice the number.
   const detail::Magnitude of_last = detail::magnitude(last);
   WideNumber<kWords, 1> factor;
   WideNumber<kWords, 4> right;

@@ -8,7 +8,7 @@ namespace {
 
 constexpr std::uint32_t kThreads = 128;
 
-/// Of the hits of a ray that float64 gave up, those count that the exact walk found.
+/// Where float64 gave up a ray, the hits count that the exact walk found.
 __global__ void __launch_bounds__(kThreads) place(const __grid_constant__ RayArgs args) {
   if (!has_room(args)) return;
   const std::uint64_t count = args.counts->found, step = std::uint64_t{gridDim.x} * kThreads;

@@ -189,7 +189,7 @@ def _write_contacts(count: wp.array[int], touches: wp.array[Touch], geom: wp.arr
     condim, mixed_friction, mixed_solref, mixed_solreffriction, mixed_solimp, mixed_adhesion = contact_material_params(
         geom_condim, geom_priority, geom_solmix, geom_solref, geom_solimp, geom_friction, geom_adhesion, pair_dim, pair_solref, pair_solreffriction, pair_solimp,
         pair_adhesion, pair_friction, geoms, pair_id[0], world)
-    # How many points of the pair come before this one.
+    # This counts the points of the pair that come before this one.
     place_in_pair = int(0)
     while place_in_pair < k and touches[k - place_in_pair - 1].a == touch.a and touches[k - place_in_pair - 1].b == touch.b:
         place_in_pair += 1

@@ -30,7 +30,7 @@ using test::rays_from_inside;
 using Places = std::vector<test::Place>;
 using Bodies = std::vector<std::vector<PosedTriangle>>;
 
-/// The same bodies on the CPU and on the GPU.
+/// This holds the same bodies on the CPU and on the GPU.
 struct Both {
   explicit Both(const BodyScene& bodies) : Both(bodies.assets.views(), bodies.instances) {}
   Both(std::span<const AssetView> views, std::span<const Instance> instances) {

@@ -37,7 +37,7 @@ bool is_on_segment(const RationalVector& x, const RationalVector& p, const Ratio
 
 }  // namespace
 
-// Of det(d, p_i, e_i), two have opposite signs.
+// A ray passes by where two of det(d, p_i, e_i) have opposite signs.
 bool surely_passes_by(const double* origin, const double* direction, const double (*corner)[3]) {
   using Interval = CGAL::Interval_nt<false>;
   const Interval::Protector rounding;

@@ -105,7 +105,7 @@ TEST_P(RayScenes, HitsAreThoseOfRationalNumbers) {
   EXPECT_GT(hits_there, 100u);
 }
 
-// The same of one mesh of 6,000 triangles, as it is stored and posed: 100,000 rays where TANDEM_LONG is set.
+// This asks it of one mesh of 6,000 triangles, stored and posed: 100,000 rays where TANDEM_LONG is set.
 TEST(Rays, FirstHitsOfAMeshAreThoseOfRationalNumbers) {
   BodyScene bodies;
   bodies.assets.add(test::project_mesh("cow.obj"));

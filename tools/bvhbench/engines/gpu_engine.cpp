@@ -126,7 +126,7 @@ void GpuEngine::begin_deforming() {
   name_shapes();
 }
 
-// Where there is a new shape, all that deform are given their positions once more.
+// If there is a new shape, all that deform are given their positions once more.
 std::optional<double> GpuEngine::deform(std::span<const BentShape> bent) {
   if (needs_.all_levels || needs_.finds_pairs) cannot("deform shapes");
   bool is_new = false;

@@ -51,8 +51,8 @@ Rows Query::probe(nb::object instances, const Probes& probes, const Stream& stre
   const OnDevice current(device());
   const Instances& bodies = bodies_of(instances, device());
   const auto query = probe_queries_.take(assets_, stream);
-  const auto report = ProbeQueries::run(
-      query, [&](tandem_gpu_probe_query* of) { return probes.find(of, bodies, stream); });
+  const auto report =
+      ProbeQueries::run(query, [&](tandem_gpu_probe_query* of) { return probes.find(of, bodies, stream); });
   return {memory_of(query, stream), Probes::rows(query.get()), report.rows, row_bytes<Probes>()};
 }
 

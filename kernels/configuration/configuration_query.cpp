@@ -28,19 +28,12 @@ struct SceneVersion {
   bool operator==(const SceneVersion&) const = default;
 };
 
-// A pair that is to be decided, and how near its boxes are: less than 0, as far as they reach into each other
-// in their shallowest direction.
+// A pair that is to be decided, and how near its boxes are by gap_of().
 struct Candidate {
   const PosedTree *a, *b;
   ObjectPair bodies;
   double gap;
 };
-
-double gap_of(const WorldBox& a, const WorldBox& b) {
-  double gap = -INFINITY;
-  for (int k = 0; k < 3; ++k) gap = std::max({gap, a.lo[k] - b.hi[k], b.lo[k] - a.hi[k]});
-  return gap;
-}
 
 Candidate candidate_of(const PosedTree& a, const PosedTree& b, const ObjectPair& bodies, double gap) {
   const bool in_order = bodies.a < bodies.b;

@@ -26,15 +26,20 @@ bool ConfigurationWorlds::place(const SceneState& scene, const ConfigurationOpti
   Buffer<std::uint32_t>& world = worlds_.columns.world;
   fixed_kept_ = fixed_kept_ && worlds_.instances.size() == all;
   if (!worlds_.instances.resize(all) || !worlds_.bodies.resize(all) || !motion.resize(all) ||
-      !world.resize(all))
+      !world.resize(all) || !worlds_.boxes.resize(all))
     return false;
   for (std::size_t i = 0; i < moving; ++i) {
     worlds_.instances[i] = {scene.instances[options.bodies[i % n]].asset, options.poses[slice.first * n + i]};
+    PosedTree tree;
+    // The poses were checked, so this is kOk.
+    if (options.find == ConfigurationPairs::nearest)
+      static_cast<void>(scene.posed(worlds_.instances[i], tree, worlds_.boxes[i]));
     motion[i] = Motion::moving;
     world[i] = static_cast<std::uint32_t>(i / n);
   }
   for (std::size_t i = 0; i < standing_.size(); ++i) {
     worlds_.instances[moving + i] = scene.instances[standing_[i]];
+    worlds_.boxes[moving + i] = scene.boxes[standing_[i]];
     motion[moving + i] = Motion::fixed;
     world[moving + i] = kEveryWorld;
   }
@@ -70,6 +75,7 @@ void ConfigurationWorlds::keep_asked(const SceneState& scene, const Configuratio
 Status ConfigurationWorlds::decide(SceneState& scene, const ConfigurationOptions& options, const Slice& slice,
                                    Buffer<ConfigurationPair>& rows, ConfigurationCounters& counters) {
   const ContactOptions asked = {.first_contact_only = true, .within = options.within};
+  counters.object_pairs += pairs_.size();
   const Status status =
       scene.device->find(worlds_, asked, {pairs_, contacts_, contact_counters_, contact_memory_});
   if (status != Status::kOk) return scene.fail(status, worlds_.where);
@@ -88,31 +94,83 @@ Status ConfigurationWorlds::decide(SceneState& scene, const ConfigurationOptions
   return Status::kOk;
 }
 
+// Bounds the distances of some pairs, and notes those that are nearer than what was nearest before.
+Status ConfigurationWorlds::bound(SceneState& scene, const ConfigurationOptions& options, const Slice& slice,
+                                  Buffer<ObjectPair>& pairs, ConfigurationCounters& counters) {
+  const DistanceOptions asked = {.tolerance = options.tolerance, .reach = options.within};
+  counters.object_pairs += pairs.size();
+  const Status status =
+      scene.device->find(worlds_, asked, {pairs, distances_, distance_counters_, distance_memory_});
+  if (status != Status::kOk) return scene.fail(status, worlds_.where);
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    ConfigurationPair row = row_of(options, slice, pairs[i]);
+    ConfigurationPair& nearest = nearest_[row.configuration - slice.first];
+    row.lower = std::min(nearest.lower, distances_[i].lower);
+    row.upper = distances_[i].upper;
+    if (row.upper < nearest.upper)
+      nearest = row;
+    else
+      nearest.lower = row.lower;
+  }
+  return Status::kOk;
+}
+
+// Puts the pair of each configuration whose boxes are nearest on a list. Pairs are sorted, so those of a
+// configuration follow each other. False: out of memory.
+bool ConfigurationWorlds::list_nearest_boxes(std::size_t moving) {
+  nearest_boxes_.clear();
+  double least = INFINITY;
+  for (std::size_t i = 0; i < pairs_.size(); ++i) {
+    const double gap = gap_of(worlds_.boxes[pairs_[i].a], worlds_.boxes[pairs_[i].b]);
+    if (i == 0 || pairs_[i].a / moving != pairs_[i - 1].a / moving) {
+      if (!nearest_boxes_.push(pairs_[i])) return false;
+    } else if (gap < least) {
+      nearest_boxes_[nearest_boxes_.size() - 1] = pairs_[i];
+    } else {
+      continue;
+    }
+    least = gap;
+  }
+  return true;
+}
+
+// Drops the pairs whose distance is known, or whose boxes are farther apart than the bodies of a pair whose
+// distance is: the distance of what is dropped is above the upper bound of that, and so above the least one.
+void ConfigurationWorlds::keep_those_that_may_be_nearer(std::size_t moving) {
+  std::size_t kept = 0, next = 0;
+  for (std::size_t i = 0; i < pairs_.size(); ++i) {
+    const ObjectPair pair = pairs_[i];
+    if (next < nearest_boxes_.size() && nearest_boxes_[next] == pair) {
+      ++next;
+      continue;
+    }
+    const double upper = nearest_[pair.a / moving].upper;
+    if (upper > 0 && distance_between(worlds_.boxes[pair.a], worlds_.boxes[pair.b]) <= upper)
+      pairs_[kept++] = pair;
+  }
+  (void)pairs_.resize(kept);
+}
+
 Status ConfigurationWorlds::measure(SceneState& scene, const ConfigurationOptions& options,
                                     const Slice& slice, Buffer<ConfigurationPair>& rows,
                                     ConfigurationCounters& counters) {
-  const DistanceOptions asked = {.tolerance = options.tolerance, .reach = options.within};
-  const Status status =
-      scene.device->find(worlds_, asked, {pairs_, distances_, distance_counters_, distance_memory_});
-  if (status != Status::kOk) return scene.fail(status, worlds_.where);
-  // Pairs are sorted, so those of a configuration follow each other.
-  ConfigurationPair nearest = {};
-  double lower = INFINITY;
-  const auto end_configuration = [&] {
-    if (!(nearest.upper < INFINITY)) return true;
+  const std::size_t moving = options.bodies.size();
+  if (!nearest_.resize(slice.count) || !list_nearest_boxes(moving))
+    return scene.fail(Status::kOutOfMemory, 0);
+  for (std::size_t i = 0; i < slice.count; ++i)
+    nearest_[i] = {slice.first + i, kNoIndex, kNoIndex, INFINITY, INFINITY};
+  Status status = bound(scene, options, slice, nearest_boxes_, counters);
+  if (status != Status::kOk) return status;
+  keep_those_that_may_be_nearer(moving);
+  status = bound(scene, options, slice, pairs_, counters);
+  if (status != Status::kOk) return status;
+  for (ConfigurationPair& nearest : std::span(nearest_.data(), nearest_.size())) {
+    if (!(nearest.upper < INFINITY)) continue;
     counters.touching += nearest.upper == 0;
-    nearest.lower = std::min(lower, nearest.upper);
-    return rows.push(nearest);
-  };
-  for (std::size_t i = 0; i < pairs_.size(); ++i) {
-    ConfigurationPair row = row_of(options, slice, pairs_[i]);
-    row.upper = distances_[i].upper;
-    const bool is_next = i == 0 || row.configuration != nearest.configuration;
-    if (is_next && i > 0 && !end_configuration()) return scene.fail(Status::kOutOfMemory, 0);
-    if (is_next || row.upper < nearest.upper) nearest = row;
-    lower = is_next ? distances_[i].lower : std::min(lower, distances_[i].lower);
+    nearest.lower = std::min(nearest.lower, nearest.upper);
+    if (!rows.push(nearest)) return scene.fail(Status::kOutOfMemory, 0);
   }
-  return pairs_.size() == 0 || end_configuration() ? Status::kOk : scene.fail(Status::kOutOfMemory, 0);
+  return Status::kOk;
 }
 
 Status ConfigurationWorlds::find(SceneState& scene, const ConfigurationOptions& options,
@@ -135,7 +193,6 @@ Status ConfigurationWorlds::find(SceneState& scene, const ConfigurationOptions& 
     Status status = scene.device->find_pairs(worlds_, options.within, fixed_kept_, pairs_);
     if (status != Status::kOk) return scene.fail(status, worlds_.where);
     keep_asked(scene, options, slice);
-    counters.object_pairs += pairs_.size();
     status = nearest ? measure(scene, options, slice, rows, counters)
                      : decide(scene, options, slice, rows, counters);
     if (status != Status::kOk) return status;

@@ -86,7 +86,7 @@ struct ClosestSearch {
 };
 
 /// The least number that is beyond a reach; infinite without one.
-inline double beyond(double reach) {
+TANDEM_HD inline double beyond(double reach) {
   return reach < HUGE_VAL ? std::nextafter(reach, HUGE_VAL) : reach;
 }
 

@@ -1,7 +1,7 @@
 #include "kernels/geometry/inside_test.h"
-#include "kernels/points_and_rays/probe_walks.cuh"
+#include "kernels/points_and_rays/tree_walk.cuh"
 
-// On which sides of closed surfaces points lie: what the ray from each to +x crosses, decided exactly.
+// Finds on which sides of closed surfaces points lie, by what the ray from each to +x crosses, exactly.
 // Compiled without fused operations: posed points are those of the CPU.
 namespace tandem::gpu {
 namespace {
@@ -48,9 +48,9 @@ __device__ void count_crossings(Crossings& crossings, Counter& looked_at) {
   }
 }
 
-__device__ void find_sides_of(const ClosestArgs& args, std::uint32_t number, Counter& looked_at) {
+__device__ void find_sides_of(const PointArgs& args, std::uint32_t number, Counter& looked_at) {
   double point[3];
-  for (int k = 0; k < 3; ++k) point[k] = args.points[std::uint64_t{3} * number + k];
+  for (int k = 0; k < 3; ++k) point[k] = args.asked.points[std::uint64_t{3} * number + k];
   std::int32_t winding = 0;
   std::uint32_t within = kNoIndex;
   const double limit = 0;
@@ -72,19 +72,19 @@ __device__ void find_sides_of(const ClosestArgs& args, std::uint32_t number, Cou
   args.rows[number].within = within;
 }
 
-__global__ void __launch_bounds__(kThreads) find(const __grid_constant__ ClosestArgs args) {
+__global__ void __launch_bounds__(kThreads) find(const __grid_constant__ PointArgs args) {
   if (args.counts->error != 0) return;
   const std::uint32_t i = blockIdx.x * kThreads + threadIdx.x;
   Counter looked_at = 0;
   if (i < args.probe_count)
     find_sides_of(args, args.probe_numbers[std::uint64_t{args.probe_count} + i], looked_at);
-  add_counts(args.counts->blocks, looked_at);
+  add_up(args.counts->blocks, looked_at);
 }
 
 }  // namespace
 
-cudaError_t find_sides(const ClosestArgs& args, cudaStream_t stream) {
-  if (!args.sides || args.probe_count == 0 || args.instances.count == 0) return cudaSuccess;
+cudaError_t find_sides(const PointArgs& args, cudaStream_t stream) {
+  if (!args.asked.sides || args.probe_count == 0 || args.instances.count == 0) return cudaSuccess;
   find<<<(args.probe_count - 1) / kThreads + 1, kThreads, 0, stream>>>(args);
   return cudaGetLastError();
 }

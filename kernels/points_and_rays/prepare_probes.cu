@@ -28,8 +28,6 @@ __device__ WorldBox nothing() {
 }
 
 __device__ WorldBox make_body(const ProbeArgs& args, std::uint32_t i, ProbedBody& body) {
-  body = {};
-  if (args.looked_at != nullptr && args.looked_at[i] == 0) return nothing();
   const std::uint32_t number = args.instances.asset[i];
   WorldBox box;
   const Status status =
@@ -46,10 +44,13 @@ __device__ WorldBox make_body(const ProbeArgs& args, std::uint32_t i, ProbedBody
   return box;
 }
 
-__global__ void __launch_bounds__(kThreads) make_bodies(const __grid_constant__ ProbeArgs args) {
+__global__ void __launch_bounds__(kThreads)
+    make_bodies(const __grid_constant__ ProbeArgs args, const std::uint8_t* looked_at) {
   const std::uint32_t i = blockIdx.x * kThreads + threadIdx.x;
   if (i >= args.instances.count) return;
-  const WorldBox box = make_body(args, i, args.bodies[i]);
+  args.bodies[i] = {};
+  const bool passed_over = looked_at != nullptr && looked_at[i] == 0;
+  const WorldBox box = passed_over ? nothing() : make_body(args, i, args.bodies[i]);
   args.boxes[i] = box;
   if (!(box.lo[0] <= box.hi[0])) return;
   for (int k = 0; k < 3; ++k) {
@@ -111,10 +112,9 @@ __global__ void __launch_bounds__(kThreads) make_level(const __grid_constant__ P
   }
 }
 
-__global__ void __launch_bounds__(kThreads) make_point_keys(const __grid_constant__ ClosestArgs args) {
-  const std::uint32_t i = blockIdx.x * kThreads + threadIdx.x;
-  if (i >= args.probe_count) return;
-  const double* const p = args.points + std::uint64_t{3} * i;
+/// The order of a point; reports what is wrong with it.
+__device__ std::uint32_t probe_key(const PointArgs& args, std::uint32_t i) {
+  const double* const p = args.asked.points + std::uint64_t{3} * i;
   if (!probe::is_in_range(p)) report_error(args, kProbe, i, Status::kOutOfRange);
   // Points beside the bodies are told apart up to half their size away.
   WorldBox bounds = bounds_of(*args.counts);
@@ -125,8 +125,7 @@ __global__ void __launch_bounds__(kThreads) make_point_keys(const __grid_constan
     bounds.hi[k] += half;
     at[k] = p[k];
   }
-  args.probe_keys[i] = key_of(bounds, at);
-  args.probe_numbers[i] = i;
+  return key_of(bounds, at);
 }
 
 __device__ Status check_ray(const double* origin, const double* direction) {
@@ -134,25 +133,27 @@ __device__ Status check_ray(const double* origin, const double* direction) {
   return direction[0] == 0 && direction[1] == 0 && direction[2] == 0 ? Status::kNoDirection : Status::kOk;
 }
 
-/// Rays that enter the scene near each other follow each other.
-__global__ void __launch_bounds__(kThreads) make_ray_keys(const __grid_constant__ RayArgs args) {
+/// The order of a ray, in which rays that enter the scene near each other follow each other.
+__device__ std::uint32_t probe_key(const RayArgs& args, std::uint32_t i) {
+  const double* const origin = args.asked.origins + std::uint64_t{3} * i;
+  const double* const direction = args.asked.directions + std::uint64_t{3} * i;
+  if (const Status status = check_ray(origin, direction); status != Status::kOk) {
+    report_error(args, kProbe, i, status);
+    return 0;
+  }
+  const WorldBox bounds = bounds_of(*args.counts);
+  const WorldRay ray = world_ray(origin, direction, INFINITY);
+  double first = 0, last = INFINITY, at[3];
+  if (!meets_box(ray, bounds.lo, bounds.hi, first, last)) first = 0;
+  for (int k = 0; k < 3; ++k) at[k] = ray.origin[k] + first * ray.scaled[k];
+  return key_of(bounds, at);
+}
+
+template <typename Options>
+__global__ void __launch_bounds__(kThreads) make_probe_keys(const __grid_constant__ AskedArgs<Options> args) {
   const std::uint32_t i = blockIdx.x * kThreads + threadIdx.x;
   if (i >= args.probe_count) return;
-  const double *const origin = args.origins + std::uint64_t{3} * i, *const direction = args.directions +
-                                                                                       std::uint64_t{3} * i;
-  const Status status = check_ray(origin, direction);
-  std::uint32_t key = 0;
-  if (status == Status::kOk) {
-    const WorldBox bounds = bounds_of(*args.counts);
-    const WorldRay ray = world_ray(origin, direction, INFINITY);
-    double first = 0, last = INFINITY, at[3];
-    if (!meets_box(ray, bounds.lo, bounds.hi, first, last)) first = 0;
-    for (int k = 0; k < 3; ++k) at[k] = ray.origin[k] + first * ray.scaled[k];
-    key = key_of(bounds, at);
-  } else {
-    report_error(args, kProbe, i, status);
-  }
-  args.probe_keys[i] = key;
+  args.probe_keys[i] = probe_key(args, i);
   args.probe_numbers[i] = i;
 }
 
@@ -168,10 +169,10 @@ cudaError_t sort(const ProbeArgs& args, std::uint32_t* keys, std::uint32_t* numb
                                          count, 0, kKeyBits + 1, stream);
 }
 
-cudaError_t prepare_bodies(const ProbeArgs& args, cudaStream_t stream) {
+cudaError_t prepare_bodies(const ProbeArgs& args, const std::uint8_t* looked_at, cudaStream_t stream) {
   const std::uint32_t count = args.instances.count;
   if (count == 0) return cudaSuccess;
-  make_bodies<<<blocks_for(count), kThreads, 0, stream>>>(args);
+  make_bodies<<<blocks_for(count), kThreads, 0, stream>>>(args, looked_at);
   make_body_keys<<<blocks_for(count), kThreads, 0, stream>>>(args);
   cudaError_t error = cudaGetLastError();
   if (error == cudaSuccess) error = sort(args, args.body_keys, args.body_numbers, count, stream);
@@ -181,16 +182,6 @@ cudaError_t prepare_bodies(const ProbeArgs& args, cudaStream_t stream) {
     error = cudaGetLastError();
   }
   return error;
-}
-
-template <typename Args>
-cudaError_t prepare(const Args& args, void (*make_keys)(Args), cudaStream_t stream) {
-  cudaError_t error = prepare_bodies(args, stream);
-  if (error != cudaSuccess || args.probe_count == 0) return error;
-  make_keys<<<blocks_for(args.probe_count), kThreads, 0, stream>>>(args);
-  error = cudaGetLastError();
-  return error == cudaSuccess ? sort(args, args.probe_keys, args.probe_numbers, args.probe_count, stream)
-                              : error;
 }
 
 }  // namespace
@@ -219,12 +210,17 @@ cudaError_t probe_scratch_bytes(std::uint32_t instances, std::uint32_t probes, s
   return error;
 }
 
-cudaError_t prepare_points(const ClosestArgs& args, cudaStream_t stream) {
-  return prepare(args, make_point_keys, stream);
+template <typename Options>
+cudaError_t prepare_probes(const AskedArgs<Options>& args, cudaStream_t stream) {
+  cudaError_t error = prepare_bodies(args, args.asked.looked_at, stream);
+  if (error != cudaSuccess || args.probe_count == 0) return error;
+  make_probe_keys<<<blocks_for(args.probe_count), kThreads, 0, stream>>>(args);
+  error = cudaGetLastError();
+  return error == cudaSuccess ? sort(args, args.probe_keys, args.probe_numbers, args.probe_count, stream)
+                              : error;
 }
 
-cudaError_t prepare_rays(const RayArgs& args, cudaStream_t stream) {
-  return prepare(args, make_ray_keys, stream);
-}
+template cudaError_t prepare_probes(const PointArgs&, cudaStream_t);
+template cudaError_t prepare_probes(const RayArgs&, cudaStream_t);
 
 }  // namespace tandem::gpu

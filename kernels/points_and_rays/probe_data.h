@@ -2,6 +2,7 @@
 #include <cuda_runtime.h>
 
 #include <cstdint>
+#include <type_traits>
 
 #include "kernels/common/launch.h"
 #include "kernels/common/pair_record.h"
@@ -9,20 +10,24 @@
 #include "kernels/geometry/local_frame.h"
 #include "kernels/points_and_rays/body_tree.h"
 #include "kernels/scene/body_visit.h"
-#include "tandem/kernels/gpu_closest_query.h"
 #include "tandem/kernels/gpu_distance_query.h"
-#include "tandem/kernels/gpu_ray_query.h"
+#include "tandem/kernels/gpu_probe_query.h"
 
 // The kernels of questions about points and rays, "probes", share this data, all of it in GPU memory.
 //
-//  1. prepare (prepare_probes.cu): a record for each body, a tree of their world boxes, and the order of the
+//  1. prepare_probes.cu makes a record for each body, a tree of their world boxes, and the order of the
 //     probes, in which neighbours follow each other.
-//  2. A walk with a thread for each probe: float32 rules out, float64 decides. A probe for which that is not
-//     sure enough is put on a list.
-//  3. A walk anew for those on the list, which decides exactly by the code of the CPU.
-//  4. Where all hits of rays are asked for: they are put in their order (order_hits.cu).
+//  2. answer_probes.cu searches with a thread for each probe: float32 rules out, float64 decides. A probe for
+//     which that is not sure enough is put on a list.
+//  3. answer_by_few_words.cu, or answer_by_most_words.cu, searches anew for those on the list, and decides
+//     exactly by the code of the CPU.
+//  4. find_sides.cu finds the sides of points, and order_hits.cu puts all hits of rays in their order, where
+//     these are asked for.
 //
-// A probe's answer depends on no other probe, so it is the same on every run.
+// What a point and a ray do alike is written once, for the arguments AskedArgs of either. What they do each
+// in its own way, the search of a probe through all bodies, is a function of the same name in
+// point_answer.cuh and ray_answer.cuh. A probe's answer depends on no other probe, so it is the same on every
+// run.
 namespace tandem::gpu {
 
 /// An error about a probe counts as one about what is asked, as a pair is.
@@ -54,10 +59,15 @@ struct ProbeCounts {
   std::uint32_t words, spare;
 };
 
-template <typename Report>
 struct ProbeState {
   ProbeCounts counts;
-  Report report;
+  GpuProbeReport report;
+};
+
+/// A row of either question: a query keeps the rows of its last call alone.
+union ProbeRow {
+  ClosestPoint point;
+  RayHit hit;
 };
 
 /// A hit among all, of no order.
@@ -67,15 +77,18 @@ struct ListedHit {
   std::uint32_t exact;  ///< whether the walk that decides exactly found it
 };
 
-/// The arguments of all kernels.
+/// The arguments that kernels have whatever is asked.
 struct ProbeArgs {
   const GpuAsset* assets;
   std::uint32_t asset_count, probe_count;
   GpuInstances instances;
-  const std::uint8_t* looked_at;
   DeviceLimits limits;
+  GpuProbeCapacity capacity;
   ProbeCounts* counts;
+  ProbeState* state;
+  GpuProbeReport* host_report;  ///< in CPU memory
 
+  const ProbedSurface* surfaces;  ///< of the assets
   ProbedBody* bodies;
   WorldBox* boxes;
   BoxTree::Group* groups;
@@ -86,33 +99,20 @@ struct ProbeArgs {
   std::uint32_t* hard;  ///< probes
   unsigned char* scratch;
   std::uint64_t scratch_bytes;
-};
 
-struct ClosestArgs : ProbeArgs {
-  const double* points;
-  DistanceTolerance tolerance;
-  double reach, beyond_reach;
-  bool sides;
-  GpuClosestCapacity capacity;
-  const ProbedSurface* surfaces;
-  ProbeState<GpuClosestReport>* state;
-  GpuClosestReport* host_report;  ///< in CPU memory
-  ClosestPoint* rows;
-};
-
-struct RayArgs : ProbeArgs {
-  const double *origins, *directions;
-  double reach;
-  RayHits wanted;
-  GpuRayCapacity capacity;
-  ProbeState<GpuRayReport>* state;
-  GpuRayReport* host_report;  ///< in CPU memory
-  RayHit* rows;
-
-  // These are for all hits alone.
+  // These are for all hits of rays alone.
   ListedHit *listed, *ordered;
   std::uint32_t *hits_of, *first_hit, *placed, *by_exact;  ///< of each ray
 };
+
+/// The arguments of a question with these options.
+template <typename Options>
+struct AskedArgs : ProbeArgs {
+  Options asked;
+  typename Options::Row* rows;
+};
+using PointArgs = AskedArgs<GpuClosestOptions>;
+using RayArgs = AskedArgs<GpuRayOptions>;
 
 /// The bytes that sorting and adding up need for so many.
 cudaError_t probe_scratch_bytes(std::uint32_t instances, std::uint32_t probes, std::size_t& bytes);
@@ -125,18 +125,28 @@ constexpr std::uint64_t groups_of(std::uint64_t bodies) {
   return bodies / 3 + BoxTree::kMostLevels;
 }
 
-cudaError_t prepare_points(const ClosestArgs& args, cudaStream_t stream);
-cudaError_t prepare_rays(const RayArgs& args, cudaStream_t stream);
-cudaError_t find_closest(const ClosestArgs& args, cudaStream_t stream);
-cudaError_t find_closest_exactly(const ClosestArgs& args, cudaStream_t stream);
-cudaError_t find_sides(const ClosestArgs& args, cudaStream_t stream);
-cudaError_t report_closest(const ClosestArgs& args, cudaStream_t stream);
-cudaError_t cast_rays(const RayArgs& args, cudaStream_t stream);
-cudaError_t cast_rays_exactly(const RayArgs& args, cudaStream_t stream);
+// The steps of a question, in their order.
+template <typename Options>
+cudaError_t prepare_probes(const AskedArgs<Options>& args, cudaStream_t stream);
+template <typename Options>
+cudaError_t answer_probes(const AskedArgs<Options>& args, cudaStream_t stream);
+template <int kWords, typename Options>
+cudaError_t answer_by_words(const AskedArgs<Options>& args, cudaStream_t stream);
+cudaError_t find_sides(const PointArgs& args, cudaStream_t stream);
 cudaError_t order_hits(const RayArgs& args, cudaStream_t stream);
-cudaError_t sort_hits(const RayArgs& args, cudaStream_t stream);
-cudaError_t cast_rays_of_most_words(const RayArgs& args, cudaStream_t stream);
-cudaError_t sort_hits_of_most_words(const RayArgs& args, cudaStream_t stream);
+cudaError_t report_probes(const ProbeArgs& args, std::uint32_t rows, cudaStream_t stream);
+
+/// Sorts the hits of each ray, and makes their rows.
+template <int kWords>
+cudaError_t sort_hits_by_words(const RayArgs& args, cudaStream_t stream);
+
+/// Calls a step for the number of words that there is room for: step(words), a constant.
+template <typename Step>
+cudaError_t with_words(const ProbeArgs& args, const Step& step) {
+  if (args.probe_count == 0) return cudaSuccess;
+  return args.capacity.words <= kFewWords ? step(std::integral_constant<int, static_cast<int>(kFewWords)>())
+                                          : step(std::integral_constant<int, tandem::detail::kMaxWords>());
+}
 
 #ifdef __CUDACC__
 
@@ -165,7 +175,7 @@ __device__ inline bool has_room(const RayArgs& args) {
 }
 
 /// Adds what the lanes of a warp counted; all take part.
-__device__ inline void add_counts(Counter& sum, Counter part) {
+__device__ inline void add_up(Counter& sum, Counter part) {
   for (int bit = 1; bit < 32; bit <<= 1) part += __shfl_xor_sync(kAllLanes, part, bit);
   if (lane_id() == 0 && part != 0) atomicAdd(&sum, part);
 }

@@ -13,14 +13,13 @@
 #include "tandem/formats/gpu_memory.h"
 #include "tandem/formats/gpu_status.h"
 #include "tandem/kernels/gpu_broad_phase.h"
-#include "tandem/kernels/gpu_closest_query.h"
 #include "tandem/kernels/gpu_containment_query.h"
 #include "tandem/kernels/gpu_deformer.h"
 #include "tandem/kernels/gpu_distance_query.h"
 #include "tandem/kernels/gpu_excluded_pairs.h"
 #include "tandem/kernels/gpu_impact_query.h"
 #include "tandem/kernels/gpu_manifold_query.h"
-#include "tandem/kernels/gpu_ray_query.h"
+#include "tandem/kernels/gpu_probe_query.h"
 #include "tandem/kernels/gpu_tolerance_query.h"
 #include "tandem/runtime/upload.h"
 
@@ -141,37 +140,27 @@ class Gpu final : public SceneDevice {
 
   Status find(SceneState& scene, const ClosestOptions& options,
               const DeviceAnswer<ClosestPoint, ClosestCounters>& found) override {
-    const auto find_closest = [&](auto& query) {
-      GpuClosestOptions on_gpu;
-      on_gpu.point_count = static_cast<std::uint32_t>(options.points.size());
-      on_gpu.tolerance = options.tolerance;
-      on_gpu.reach = options.reach;
-      on_gpu.sides = options.sides;
-      on_gpu.looked_at = looked_at();
-      Status status = upload_triples(options.points, points_on_gpu_, on_gpu.points);
-      if (status == Status::kOk) status = query.find(instances_, on_gpu, kStream);
-      if (status == Status::kOk) status = copy(query.rows(), on_gpu.point_count, found.rows);
-      return status;
-    };
-    return ask<GpuClosestQuery>(scene, found, Status::kOk, find_closest, options.points.empty());
+    GpuClosestOptions on_gpu;
+    on_gpu.point_count = static_cast<std::uint32_t>(options.points.size());
+    on_gpu.tolerance = options.tolerance;
+    on_gpu.reach = options.reach;
+    on_gpu.sides = options.sides;
+    const auto upload_points = [&] { return upload_triples(options.points, points_on_gpu_, on_gpu.points); };
+    return ask_probes(scene, found, on_gpu, options.points.empty(), upload_points, &GpuProbeQuery::closest);
   }
 
   Status find(SceneState& scene, const RayOptions& options,
               const DeviceAnswer<RayHit, RayCounters>& found) override {
-    const auto find_hits = [&](auto& query) {
-      GpuRayOptions on_gpu;
-      on_gpu.ray_count = static_cast<std::uint32_t>(options.origins.size());
-      on_gpu.reach = options.reach;
-      on_gpu.hits = options.hits;
-      on_gpu.looked_at = looked_at();
-      Status status = upload_triples(options.origins, points_on_gpu_, on_gpu.origins);
-      if (status == Status::kOk)
-        status = upload_triples(options.directions, directions_on_gpu_, on_gpu.directions);
-      if (status == Status::kOk) status = query.find(instances_, on_gpu, kStream);
-      if (status == Status::kOk) status = copy(query.rows(), query.report().rows, found.rows);
-      return status;
+    GpuRayOptions on_gpu;
+    on_gpu.ray_count = static_cast<std::uint32_t>(options.origins.size());
+    on_gpu.reach = options.reach;
+    on_gpu.hits = options.hits;
+    const auto upload_rays = [&] {
+      const Status status = upload_triples(options.origins, points_on_gpu_, on_gpu.origins);
+      return status == Status::kOk ? upload_triples(options.directions, directions_on_gpu_, on_gpu.directions)
+                                   : status;
     };
-    return ask<GpuRayQuery>(scene, found, Status::kOk, find_hits, options.origins.empty());
+    return ask_probes(scene, found, on_gpu, options.origins.empty(), upload_rays, &GpuProbeQuery::hits);
   }
 
   Status find(SceneState& scene, const ImpactOptions& options, bool finds_pairs,
@@ -331,8 +320,6 @@ class Gpu final : public SceneDevice {
     on_gpu = room.data();
     return status;
   }
-  // The bodies at which a question about points and rays looks; null: all.
-  const std::uint8_t* looked_at() const { return is_there_.size() != 0 ? is_there_on_gpu_.data() : nullptr; }
   static Status wait() { return status_of(cudaStreamSynchronize(kStream)); }
 
   Status upload_pairs(std::span<const ObjectPair> pairs) {
@@ -435,6 +422,21 @@ class Gpu final : public SceneDevice {
     if constexpr (requires { found.counters = query->report().counters; })
       found.counters = query->report().counters;
     return status;
+  }
+
+  // Asks about points or rays, which upload() copies to where `on_gpu` says they are. rows: those of the
+  // query.
+  template <typename Row, typename Counters, typename Options, typename Upload>
+  Status ask_probes(SceneState& scene, const DeviceAnswer<Row, Counters>& found, Options& on_gpu,
+                    bool is_empty, const Upload& upload, const Row* (GpuProbeQuery::*rows)() const) {
+    const auto call = [&](GpuProbeQuery& query) {
+      on_gpu.looked_at = is_there_.size() != 0 ? is_there_on_gpu_.data() : nullptr;
+      Status status = upload();
+      if (status == Status::kOk) status = query.find(instances_, on_gpu, kStream);
+      if (status == Status::kOk) status = copy((query.*rows)(), query.report().rows, found.rows);
+      return status;
+    };
+    return ask<GpuProbeQuery>(scene, found, Status::kOk, call, is_empty);
   }
 
   // The query of a question, which knows these assets.

@@ -92,6 +92,7 @@ typedef tandem_gpu_containment_capacity tandem_gpu_containment_query_capacity_t;
 typedef tandem_gpu_distance_capacity tandem_gpu_distance_query_capacity_t;
 typedef tandem_gpu_impact_capacity tandem_gpu_impact_query_capacity_t;
 typedef tandem_gpu_tolerance_capacity tandem_gpu_tolerance_query_capacity_t;
+typedef tandem_gpu_probe_capacity tandem_gpu_probe_query_capacity_t;
 
 static void test_handles(void) {
   tandem_gpu_contact_query* query = NULL;
@@ -126,6 +127,14 @@ static void test_handles(void) {
   TEST_HANDLE(tandem_gpu_tolerance_query, tandem_gpu_tolerance_query_find(handle, &bodies, &pairs, 0, NULL),
               tandem_gpu_tolerance_query_reserve(handle, &capacity),
               tandem_gpu_tolerance_query_verdicts(handle));
+  TEST_HANDLE(tandem_gpu_probe_query, tandem_gpu_probe_query_find_closest(handle, &bodies, NULL, NULL),
+              tandem_gpu_probe_query_reserve(handle, &capacity), tandem_gpu_probe_query_closest(handle));
+  TEST_HANDLE(tandem_gpu_probe_query, tandem_gpu_probe_query_enqueue_closest(handle, &bodies, NULL, NULL),
+              tandem_gpu_probe_query_reserve(handle, &capacity), tandem_gpu_probe_query_closest(handle));
+  TEST_HANDLE(tandem_gpu_probe_query, tandem_gpu_probe_query_find_rays(handle, &bodies, NULL, NULL),
+              tandem_gpu_probe_query_reserve(handle, &capacity), tandem_gpu_probe_query_rays(handle));
+  TEST_HANDLE(tandem_gpu_probe_query, tandem_gpu_probe_query_enqueue_rays(handle, &bodies, NULL, NULL),
+              tandem_gpu_probe_query_reserve(handle, &capacity), tandem_gpu_probe_query_rays(handle));
   CHECK_STATUS(tandem_gpu_contact_query_set_assets(query, NULL, NULL), TANDEM_NULL_ARGUMENT);
   tandem_gpu_contact_query_destroy(query);
 }

@@ -212,6 +212,98 @@ static void test_a_graph(void) {
   free_gpu_scene(&scene);
 }
 
+// Probes, on the CPU and on the GPU, and what is asked about them on both.
+enum { kProbes = 500 };
+typedef struct Probes {
+  double origins[kProbes][3], directions[kProbes][3];
+  double *gpu_origins, *gpu_directions;
+  GpuScene scene;
+  tandem_scene* expected;
+  tandem_gpu_probe_query* query;
+} Probes;
+
+static void make_probes(Probes* probes) {
+  tandem_instance bodies[kBodies];
+  place(bodies, 0);
+  for (int i = 0; i < kProbes; ++i) {
+    for (int k = 0; k < 3; ++k) {
+      probes->origins[i][k] = 4 * random_number() - 1;
+      probes->directions[i][k] = 2 * random_number() - 1;
+    }
+  }
+  probes->scene = scene_to_gpu(bodies, kBodies);
+  probes->expected = cpu_scene(bodies);
+  probes->gpu_origins = (double*)to_gpu(probes->origins, sizeof probes->origins);
+  probes->gpu_directions = (double*)to_gpu(probes->directions, sizeof probes->directions);
+  CHECK_STATUS(tandem_gpu_probe_query_create(NULL, &probes->query), TANDEM_OK);
+  CHECK_STATUS(tandem_gpu_probe_query_set_assets(probes->query, gpu_assets, stream), TANDEM_OK);
+}
+
+// Closest points are as certified as the CPU's, with the same sides.
+static void test_points(const Probes* probes) {
+  const tandem_closest_options options = {
+      .struct_size = sizeof options, .sides = 1, .points = &probes->origins[0][0], .point_count = kProbes};
+  const tandem_gpu_closest_options on_gpu = {
+      .struct_size = sizeof on_gpu, .points = probes->gpu_origins, .point_count = kProbes, .sides = 1};
+  tandem_gpu_probe_report report;
+  size_t count = 0;
+  CHECK_STATUS(tandem_scene_find_closest(probes->expected, &options), TANDEM_OK);
+  const tandem_closest_point* points = tandem_scene_closest(probes->expected, &count);
+  CHECK_STATUS(tandem_gpu_probe_query_find_closest(probes->query, &probes->scene.instances, &on_gpu, stream),
+               TANDEM_OK);
+  CHECK_STATUS(tandem_gpu_probe_query_get_report(probes->query, &report), TANDEM_OK);
+  CHECK(report.rows == count && count == kProbes && report.counters.probes == kProbes);
+  tandem_closest_point* ours =
+      (tandem_closest_point*)from_gpu(tandem_gpu_probe_query_closest(probes->query), count * sizeof *ours);
+  for (size_t i = 0; i < count; ++i) {
+    CHECK(ours[i].lower <= points[i].upper && points[i].lower <= ours[i].upper);
+    CHECK(ours[i].within == points[i].within && ours[i].winding == points[i].winding);
+  }
+  free(ours);
+}
+
+// The hits of rays are the CPU's, byte for byte.
+static void test_rays(const Probes* probes) {
+  const tandem_ray_options options = {.struct_size = sizeof options,
+                                      .hits = TANDEM_ALL_HITS,
+                                      .origins = &probes->origins[0][0],
+                                      .directions = &probes->directions[0][0],
+                                      .ray_count = kProbes};
+  const tandem_gpu_ray_options on_gpu = {.struct_size = sizeof on_gpu,
+                                         .hits = TANDEM_ALL_HITS,
+                                         .ray_count = kProbes,
+                                         .origins = probes->gpu_origins,
+                                         .directions = probes->gpu_directions};
+  const tandem_gpu_probe_capacity room = {kBodies, kProbes, 0, 0};
+  const tandem_gpu_instances* const bodies = &probes->scene.instances;
+  tandem_gpu_probe_report report;
+  size_t count = 0;
+  CHECK_STATUS(tandem_scene_find_rays(probes->expected, &options), TANDEM_OK);
+  const tandem_ray_hit* hits = tandem_scene_rays(probes->expected, &count);
+  CHECK_STATUS(tandem_gpu_probe_query_reserve(probes->query, &room), TANDEM_OK);
+  CHECK_STATUS(tandem_gpu_probe_query_enqueue_rays(probes->query, bodies, &on_gpu, stream),
+               TANDEM_OUT_OF_RANGE);
+  CHECK_STATUS(tandem_gpu_probe_query_find_rays(probes->query, bodies, &on_gpu, stream), TANDEM_OK);
+  CHECK_STATUS(tandem_gpu_probe_query_get_report(probes->query, &report), TANDEM_OK);
+  CHECK(report.rows == count && count > 0 && report.counters.hits == count);
+  tandem_ray_hit* ours =
+      (tandem_ray_hit*)from_gpu(tandem_gpu_probe_query_rays(probes->query), count * sizeof *ours);
+  CHECK(memcmp(ours, hits, count * sizeof *ours) == 0);
+  free(ours);
+}
+
+static void test_points_and_rays(void) {
+  static Probes probes;
+  make_probes(&probes);
+  test_points(&probes);
+  test_rays(&probes);
+  tandem_gpu_probe_query_destroy(probes.query);
+  cuda_must(cudaFree(probes.gpu_origins));
+  cuda_must(cudaFree(probes.gpu_directions));
+  free_gpu_scene(&probes.scene);
+  tandem_scene_destroy(probes.expected);
+}
+
 // Distances, times of impact and verdicts: as certified as the CPU's, or the same.
 static void test_distances_and_impacts(void) {
   tandem_instance bodies[kBodies];
@@ -407,6 +499,7 @@ int main(int argc, char** argv) {
   test_options();
   test_filters();
   test_a_graph();
+  test_points_and_rays();
   test_distances_and_impacts();
   test_errors();
   end();

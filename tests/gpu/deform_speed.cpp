@@ -2,13 +2,12 @@
 // All bodies are of the file's mesh, each twisted in its own way; they stand in a square grid along x and y,
 // SPACING of the mesh's width apart (1000 bodies and 0.9 where not given). Prints the median of 100 launches
 // of a graph.
-#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <vector>
 
-#include "tandem/formats/gpu_stream.h"
+#include "gpu/gpu_speed.h"
 #include "tandem/kernels/gpu_broad_phase.h"
 #include "tandem/kernels/gpu_contact_query.h"
 #include "tandem/kernels/gpu_deformer.h"
@@ -19,17 +18,6 @@ namespace tandem {
 namespace {
 
 constexpr int kLaunches = 100;
-
-void expect(Status status, const char* what) {
-  if (status == Status::kOk) return;
-  std::fprintf(stderr, "deform_speed: %s: %s\n", what, name(status));
-  std::exit(status == Status::kNoGpu ? 77 : 1);
-}
-void expect(cudaError_t error, const char* what) {
-  if (error == cudaSuccess) return;
-  std::fprintf(stderr, "deform_speed: %s: %s\n", what, cudaGetErrorString(error));
-  std::exit(1);
-}
 
 /// The positions of the source vertices at rest, in the file's coordinates. Those that no triangle has are at
 /// the origin of the file.
@@ -62,34 +50,6 @@ void twist(std::vector<float>& positions, const AssetView& asset, double amount)
     positions[i] = static_cast<float>(middle[0] + c * x - s * y);
     positions[i + 1] = static_cast<float>(middle[1] + s * x + c * y);
   }
-}
-
-template <typename Element>
-void upload(const std::vector<Element>& from, GpuArray<Element>& to, const char* what) {
-  expect(to.upload(from, nullptr), what);
-  expect(cudaStreamSynchronize(nullptr), what);
-}
-
-/// The median time of a graph's launches, in ms. enqueue(stream): a Status.
-template <typename Enqueue>
-double median_of(cudaStream_t stream, const Enqueue& enqueue) {
-  GpuGraph graph;
-  expect(graph.capture(stream, [&] { expect(enqueue(stream), "enqueue"); }), "capture");
-  GpuEvent begin, end;
-  expect(begin.create(), "event");
-  expect(end.create(), "event");
-  std::vector<float> times;
-  for (int i = 0; i < kLaunches + 5; ++i) {
-    expect(begin.record(stream), "record");
-    expect(graph.launch(stream), "launch");
-    expect(end.record(stream), "record");
-    expect(end.wait(), "wait");
-    float milliseconds = 0;
-    expect(milliseconds_between(begin, end, milliseconds), "time");
-    if (i >= 5) times.push_back(milliseconds);
-  }
-  std::nth_element(times.begin(), times.begin() + kLaunches / 2, times.end());
-  return double{times[kLaunches / 2]};
 }
 
 /// A step of bodies whose records and bounds are these.
@@ -172,20 +132,20 @@ int run(const char* path, std::uint32_t bodies, double spacing) {
   std::printf("%u bodies of %u triangles, %u blocks, %zu vertices; %.2f GB of trees\n", bodies,
               view.level().triangle_count, view.level().block_count, rest.size() / 3,
               1e-9 * static_cast<double>(deformer.bytes()));
-  const double refit_ms = median_of(stream.get(), refit);
+  const double refit_ms = median_of(kLaunches, stream.get(), refit);
   const double bytes =
       bodies * (view.level().triangle_count * (48.0 + 12) + view.level().block_count * (128.0 + 112) +
                 4.0 * static_cast<double>(rest.size()));
   std::printf("%-28s %8.3f ms, %.0f GB/s of triangles, blocks and positions\n", "refit", refit_ms,
               1e-6 * bytes / refit_ms);
   bent.print("deformed: pairs, contacts",
-             median_of(stream.get(), [&](cudaStream_t on) { return bent.enqueue(on); }));
-  bent.print("refit, pairs, contacts", median_of(stream.get(), [&](cudaStream_t on) {
+             median_of(kLaunches, stream.get(), [&](cudaStream_t on) { return bent.enqueue(on); }));
+  bent.print("refit, pairs, contacts", median_of(kLaunches, stream.get(), [&](cudaStream_t on) {
                const Status status = refit(on);
                return status == Status::kOk ? bent.enqueue(on) : status;
              }));
   rigid.print("at rest: pairs, contacts",
-              median_of(stream.get(), [&](cudaStream_t on) { return rigid.enqueue(on); }));
+              median_of(kLaunches, stream.get(), [&](cudaStream_t on) { return rigid.enqueue(on); }));
   expect(deformer.report().status, "report");
   expect(bent.query.report().status, "report");
   expect(rigid.query.report().status, "report");

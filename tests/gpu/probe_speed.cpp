@@ -1,16 +1,13 @@
 // Measures closest points and rays of one body on a GPU: probe_speed FILE.bvh [COUNT]
 // COUNT points lie at random places in a box twice as large as the mesh's, and as many rays go from there in
 // random directions (10^6 where not given). Prints the median of 20 launches of a graph.
-#include <algorithm>
-#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <random>
 #include <vector>
 
-#include "tandem/formats/gpu_stream.h"
-#include "tandem/kernels/gpu_closest_query.h"
-#include "tandem/kernels/gpu_ray_query.h"
+#include "gpu/gpu_speed.h"
+#include "tandem/kernels/gpu_probe_query.h"
 #include "tandem/runtime/map.h"
 #include "tandem/runtime/upload.h"
 
@@ -19,47 +16,7 @@ namespace {
 
 constexpr int kLaunches = 20;
 
-void expect(Status status, const char* what) {
-  if (status == Status::kOk) return;
-  std::fprintf(stderr, "probe_speed: %s: %s\n", what, name(status));
-  std::exit(status == Status::kNoGpu ? 77 : 1);
-}
-void expect(cudaError_t error, const char* what) {
-  if (error == cudaSuccess) return;
-  std::fprintf(stderr, "probe_speed: %s: %s\n", what, cudaGetErrorString(error));
-  std::exit(1);
-}
-
-template <typename Element>
-void upload(const std::vector<Element>& from, GpuArray<Element>& to, const char* what) {
-  expect(to.upload(from, nullptr), what);
-  expect(cudaStreamSynchronize(nullptr), what);
-}
-
-/// The median time of a graph's launches, in ms. enqueue(stream): a Status.
-template <typename Enqueue>
-double median_of(cudaStream_t stream, const Enqueue& enqueue) {
-  GpuGraph graph;
-  expect(graph.capture(stream, [&] { expect(enqueue(stream), "enqueue"); }), "capture");
-  GpuEvent begin, end;
-  expect(begin.create(), "event");
-  expect(end.create(), "event");
-  std::vector<float> times;
-  for (int i = 0; i < kLaunches + 2; ++i) {
-    expect(begin.record(stream), "record");
-    expect(graph.launch(stream), "launch");
-    expect(end.record(stream), "record");
-    expect(end.wait(), "wait");
-    float milliseconds = 0;
-    expect(milliseconds_between(begin, end, milliseconds), "time");
-    if (i >= 2) times.push_back(milliseconds);
-  }
-  std::nth_element(times.begin(), times.begin() + kLaunches / 2, times.end());
-  return double{times[kLaunches / 2]};
-}
-
-template <typename Report>
-void print(const char* what, double milliseconds, std::uint32_t count, const Report& report) {
+void print(const char* what, double milliseconds, std::uint32_t count, const GpuProbeReport& report) {
   std::printf(
       "%-24s %8.3f ms, %7.1f million a second; %u left by float64, %.1f blocks and %.2f triangles each\n",
       what, milliseconds, 1e-3 * count / milliseconds, report.exact,
@@ -95,10 +52,8 @@ int run(const char* path, std::uint32_t count) {
   upload(std::vector<Pose>{kIdentityPose}, pose, "pose");
   const GpuInstances instances = {number.data(), pose.data(), 1};
 
-  GpuClosestQuery closest;
-  GpuRayQuery rays;
-  expect(closest.set_assets({&asset, 1}, nullptr), "assets");
-  expect(rays.set_assets({&asset, 1}, nullptr), "assets");
+  GpuProbeQuery query;
+  expect(query.set_assets({&asset, 1}, nullptr), "assets");
   GpuStream stream;
   expect(stream.create(), "stream");
   std::printf("%s: %u triangles; %u points and rays\n", path, asset.tree.triangle_count, count);
@@ -108,10 +63,10 @@ int run(const char* path, std::uint32_t count) {
     options.points = points_on_gpu.data();
     options.point_count = count;
     options.sides = sides;
-    expect(closest.find(instances, options, nullptr), "closest points");
-    const double time =
-        median_of(stream.get(), [&](cudaStream_t on) { return closest.enqueue(instances, options, on); });
-    print(sides ? "closest points and sides" : "closest points", time, count, closest.report());
+    expect(query.find(instances, options, nullptr), "closest points");
+    const double time = median_of(kLaunches, stream.get(),
+                                  [&](cudaStream_t on) { return query.enqueue(instances, options, on); });
+    print(sides ? "closest points and sides" : "closest points", time, count, query.report());
   }
   for (const RayHits hits : {RayHits::first, RayHits::any, RayHits::all}) {
     GpuRayOptions options;
@@ -119,13 +74,13 @@ int run(const char* path, std::uint32_t count) {
     options.directions = directions_on_gpu.data();
     options.ray_count = count;
     options.hits = hits;
-    expect(rays.find(instances, options, nullptr), "rays");
-    const double time =
-        median_of(stream.get(), [&](cudaStream_t on) { return rays.enqueue(instances, options, on); });
+    expect(query.find(instances, options, nullptr), "rays");
+    const double time = median_of(kLaunches, stream.get(),
+                                  [&](cudaStream_t on) { return query.enqueue(instances, options, on); });
     print(hits == RayHits::first ? "first hits"
           : hits == RayHits::any ? "any hits"
                                  : "all hits",
-          time, count, rays.report());
+          time, count, query.report());
   }
   return 0;
 }

@@ -1,4 +1,6 @@
 """tandem.cuda: what it finds is what the CPU finds, from and to the arrays of PyTorch, CuPy and JAX, without a copy. Skipped where there is no GPU."""
+import contextlib
+import ctypes
 import doctest
 import gc
 import os
@@ -6,7 +8,6 @@ import re
 import subprocess
 import sys
 import threading
-import time
 import weakref
 from pathlib import Path
 from types import SimpleNamespace
@@ -323,47 +324,6 @@ def test_distances_impacts_and_verdicts(torch, assets):
 
 
 @needs_gpu
-def test_points_and_rays_are_those_of_the_cpu(assets, library):
-    asset, pose = make_scene()
-    random = np.random.default_rng(5)
-    points, along = 3 * random.random((2000, 3)) - 0.25, random.normal(size=(2000, 3))
-    query, on_cpu = cuda.Query(assets), tandem.Scene(assets).place(cpu_instances(asset, pose))
-    bodies = query.instances(library.put(asset), library.put(pose))
-    found = query.closest(library.put(points), bodies, sides=True)
-    rows, theirs = found.numpy(), on_cpu.closest(points, sides=True)
-    assert np.all(rows["lower"] <= theirs["upper"]) and np.all(theirs["lower"] <= rows["upper"])
-    assert np.array_equal(rows["within"], theirs["within"]) and np.array_equal(rows["winding"], theirs["winding"])
-    assert len({*rows["winding"]}) > 1 and found["winding"].dtype == "int32"
-    for hits in ("first", "all"):
-        assert np.array_equal(query.rays(library.put(points), library.put(along), bodies, hits=hits).numpy(), on_cpu.rays(points, along, hits=hits))
-    within, theirs = (scene.rays(*of, hits="any", reach=0.5) for scene, of in ((query, (library.put(points), library.put(along), bodies)), (on_cpu, (points, along))))
-    assert np.array_equal(within.numpy()["body"] == tandem.NO_INDEX, theirs["body"] == tandem.NO_INDEX)
-    words = library.take(found)
-    assert library.pointer(words) == found.words.pointer
-
-
-@needs_gpu
-def test_what_is_no_point_and_no_ray_is_named(torch, posed):
-    query, bodies = posed
-    points = torch.zeros((5, 3), dtype=torch.float64, device="cuda")
-    along = torch.ones_like(points)
-    along[3] = 0
-    with pytest.raises(tandem.Error) as caught:
-        query.rays(points, along, bodies)
-    assert (caught.value.name, caught.value.where) == ("NoDirection", 3)
-    points[2, 1] = float("nan")
-    with pytest.raises(tandem.Error) as caught:
-        query.closest(points, bodies)
-    assert (caught.value.name, caught.value.where) == ("OutOfRange", 2)
-    for error, words, given in ((TypeError, "points is float32", points.float()), (ValueError, r"points has shape \(15,\)", points.reshape(15))):
-        with pytest.raises(error, match=words):
-            query.closest(given, bodies)
-    with pytest.raises(ValueError, match="directions has shape"):
-        query.rays(along, along[:4].contiguous(), bodies)
-    assert len(query.closest(points[:0], bodies)) == len(query.rays(points[:0], along[:0], bodies)) == 0
-
-
-@needs_gpu
 def test_filters_and_pairs(torch, assets):
     asset, pose = make_scene()
     motion = np.where(np.arange(COUNT) % 3 == 0, tandem.FIXED, tandem.MOVING).astype(np.uint8)
@@ -466,25 +426,71 @@ def test_waiting_after_a_replay(torch, assets):
     assert len(seen) == 4
 
 
+@contextlib.contextmanager
+def held(stream):
+    """What is queued on the stream behind this waits until the process that it gives is killed, or has slept for 30 seconds: the stream reads what that never writes,
+    and Python's lock is not needed for that."""
+    libc, driver = ctypes.CDLL(None), ctypes.CDLL("libcuda.so.1")
+    libc.fdopen.restype = ctypes.c_void_p
+    with subprocess.Popen(["sleep", "30"], stdout=subprocess.PIPE) as sleeper:
+        file = ctypes.c_void_p(libc.fdopen(os.dup(sleeper.stdout.fileno()), b"r"))
+        assert driver.cuLaunchHostFunc(ctypes.c_void_p(stream.cuda_stream), ctypes.cast(libc.fgetc, ctypes.c_void_p), file) == 0
+        try:
+            yield sleeper
+        finally:
+            sleeper.kill()
+            stream.synchronize()
+            libc.fclose(file)
+
+
 @needs_gpu
 def test_a_step_takes_one_call_at_a_time(torch, assets):
+    """Two threads wait for a stream that stands still until one of them is refused."""
     asset, pose = make_scene()
-    query, stream, counts = cuda.Query(assets), torch.cuda.Stream(), []
+    query, stream, counts, refused = cuda.Query(assets), torch.cuda.Stream(), [], []
     bodies = query.instances(torch.from_numpy(asset).cuda(), torch.from_numpy(pose).cuda())
     query.reserve(instances=COUNT, pairs=4000, contacts=100_000)
     expected = query.enqueue(bodies).wait()
-    with torch.cuda.stream(stream):
-        torch.cuda._sleep(1_000_000_000)  # half a second
-    queued = query.enqueue(bodies, stream=stream)
-    thread = threading.Thread(target=lambda: counts.append(queued.wait()))
-    thread.start()
-    time.sleep(0.1)
-    with pytest.raises(RuntimeError, match="at work for another thread"):
-        query.enqueue(bodies)
-    with pytest.raises(RuntimeError, match="at work for another thread"):
-        queued.wait()
-    thread.join()
+    with held(stream) as hold:
+        queued = query.enqueue(bodies, stream=stream)
+        assert hold.poll() is None, "enqueue() waited for the stream"
+
+        def wait():
+            try:
+                counts.append(queued.wait())
+            except RuntimeError as error:
+                refused.append(str(error))
+                with pytest.raises(RuntimeError, match="at work for another thread"):  # which waits until the stream goes on
+                    query.enqueue(bodies)
+                hold.kill()
+
+        threads = [threading.Thread(target=wait) for _ in range(2)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+    assert refused == ["the query is at work for another thread"]
     assert counts == [expected] == [query.enqueue(bodies).wait()]
+
+
+@needs_gpu
+def test_a_query_takes_one_call_at_a_time(torch, posed):
+    """A call that comes while another one takes its arrays is refused."""
+    query, bodies = posed
+    motion, refused = torch.zeros((COUNT, 9), dtype=torch.float64, device="cuda"), []
+
+    class Asks:
+        def __dlpack_device__(self):
+            return motion.__dlpack_device__()
+
+        def __dlpack__(self, **arguments):
+            with pytest.raises(RuntimeError, match="at work for another thread"):
+                query.contacts(bodies)
+            refused.append(True)
+            return motion.__dlpack__(**arguments)
+
+    found = query.impacts(bodies, motion=Asks(), duration=0.1)
+    assert refused == [True] and len(found.impacts) == len(query.impacts(bodies, motion=motion, duration=0.1).impacts) > 0
 
 
 @needs_gpu

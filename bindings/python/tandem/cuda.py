@@ -26,7 +26,7 @@ try:
 except ImportError as missing:
     raise ImportError(f"tandem.cuda is not there: the package was built without CUDA, or CUDA's runtime is not found ({missing})") from missing
 
-__all__ = ["Array", "Contacts", "Contained", "Distances", "Filter", "Impacts", "Instances", "Manifolds", "Positions", "Query", "Queued", "Rows", "TooLittleRoom", "Verdicts"]
+__all__ = ["Array", "Contacts", "Contained", "Distances", "Filter", "Impacts", "Instances", "Manifolds", "Positions", "Query", "Queued", "QueuedProbes", "Rows", "TooLittleRoom", "Verdicts"]
 
 #: An array in GPU memory, with DLPack and `__cuda_array_interface__`, `shape`, `dtype` and `pointer`. It keeps the memory that it lies in.
 Array = _cuda.Array
@@ -43,6 +43,9 @@ _REPORT = np.dtype([("status", "<u4"), ("complete", "<u4"), ("where", "<u8"), ("
 _MANIFOLD_REPORT = np.dtype([("status", "<u4"), ("complete", "<u4"), ("needed_pairs", "<u4"), ("reserved", "<u4"), ("needed_contacts", "<u8"), ("needed_manifolds", "<u4"),
                              ("needed_points", "<u4"), ("manifolds", "<u4"), ("points", "<u4"), ("counters", "<u8", (6,))])
 
+_PROBE_REPORT = np.dtype([("status", "<u4"), ("complete", "<u4"), ("where", "<u8"), ("needed_instances", "<u4"), ("needed_probes", "<u4"), ("needed_hits", "<u4"),
+                          ("needed_words", "<u4"), ("rows", "<u4"), ("exact", "<u4"), ("counters", "<u8", (4,))])
+
 
 def _columns(dtype: np.dtype[Any]) -> dict[str, tuple[int, int, int, int]]:
     """Returns for each field what Rows.column() takes: offset, kind, bits and how many; 0: one."""
@@ -53,7 +56,7 @@ def _columns(dtype: np.dtype[Any]) -> dict[str, tuple[int, int, int, int]]:
     return columns
 
 
-_FIELDS = {dtype: _columns(dtype) for dtype in (PAIR, CLOSEST_POINT, CONTACT, MANIFOLD, POINT, CONTAINMENT, DISTANCE, IMPACT, RAY_HIT, VERDICT, _REPORT, _MANIFOLD_REPORT)}
+_FIELDS = {dtype: _columns(dtype) for dtype in (PAIR, CLOSEST_POINT, CONTACT, MANIFOLD, POINT, CONTAINMENT, DISTANCE, IMPACT, RAY_HIT, VERDICT, _REPORT, _MANIFOLD_REPORT, _PROBE_REPORT)}
 
 
 class Rows:
@@ -115,17 +118,19 @@ Verdicts = NamedTuple("Verdicts", [("pairs", Any), ("verdicts", Rows)])
 
 
 class TooLittleRoom(Error):
-    """A queued query did not fit: contacts, or manifolds, are missing. `pairs`, `contacts`, `undecided`, `manifolds` and `points` are the room that it needs at
-    least: exact for what follows from what did fit, so that with them it may still want more of another."""
+    """A queued query did not fit: rows are missing. `pairs`, `contacts`, `undecided`, `manifolds` and `points`, or of points and rays `hits` and `words`, are the room
+    that it needs at least, and 0 where it has none of these: exact for what follows from what did fit, so that with them it may still want more of another."""
 
-    def __init__(self, pairs: int, contacts: int, undecided: int, manifolds: int = 0, points: int = 0):
-        of_manifolds = f", {manifolds} manifolds, {points} points" if manifolds or points else ""
-        super().__init__(f"too little room: reserve {pairs} pairs, {contacts} contacts, {undecided} undecided{of_manifolds}", name="TooLittleRoom")
-        self.pairs = pairs
-        self.contacts = contacts
-        self.undecided = undecided
-        self.manifolds = manifolds
-        self.points = points
+    def __init__(self, **needed: int):
+        room = ", ".join(f"{count} {name}" for name, count in needed.items() if count)
+        super().__init__(f"too little room: reserve {room}", name="TooLittleRoom")
+        self.pairs = needed.get("pairs", 0)
+        self.contacts = needed.get("contacts", 0)
+        self.undecided = needed.get("undecided", 0)
+        self.manifolds = needed.get("manifolds", 0)
+        self.points = needed.get("points", 0)
+        self.hits = needed.get("hits", 0)
+        self.words = needed.get("words", 0)
 
 
 def _stream(stream: Any) -> _cuda.Stream:
@@ -266,8 +271,40 @@ class Queued:
         """
         complete, pairs, contacts, *needed = self._core.wait(self._given, None if stream is None else _stream(stream))
         if not complete:
-            raise TooLittleRoom(*needed)
+            raise TooLittleRoom(**dict(zip(("pairs", "contacts", "undecided", "manifolds", "points"), needed)))
         return pairs, contacts
+
+
+class QueuedProbes:
+    """Points or rays that `Query.enqueue_closest` or `Query.enqueue_rays` has queued: what Queued is for contacts. The next call that a query queues for points or
+    rays writes to the same arrays."""
+
+    __slots__ = ("_core", "_instances", "_probes", "rows")
+
+    def __init__(self, core: _cuda.ProbeStep, instances: _cuda.Instances, probes: _cuda.Points | _cuda.Rays, rows: Rows):
+        self._core: _cuda.ProbeStep = core
+        self._instances = instances
+        self._probes = probes
+        #: Rows of CLOSEST_POINT, one for each point, or of RAY_HIT: one for each ray, or where all hits are asked for, room for them, and the first
+        #: `report["rows"]` of them are there.
+        self.rows = rows
+
+    @property
+    def report(self) -> Rows:
+        """One row: `status`, not 0 where something is wrong; `complete`, 0 where something did not fit, and then rows mean nothing; `rows`; `needed_hits`, ..."""
+        return Rows(self._core.report(), _PROBE_REPORT)
+
+    def wait(self, stream: Any = None) -> int:
+        """Waits for a stream, as `Queued.wait` does; how many rows there are, of what ran last.
+
+        Raises:
+            Error: what the GPU found wrong, with the instance, point or ray to blame.
+            TooLittleRoom: hits are missing, or words of a coordinate.
+        """
+        complete, rows, hits, words = self._core.wait(None if stream is None else _stream(stream))
+        if not complete:
+            raise TooLittleRoom(hits=hits, words=words)
+        return rows
 
 
 class Query:
@@ -288,12 +325,12 @@ class Query:
     They must be contiguous and on the query's device: nothing is ever copied or converted. Wrong types raise TypeError, wrong shapes, strides and devices
     ValueError. Error: an instance's pose is not rigid, ...; `where` is the instance or pair to blame.
 
-    Calls wait for their results, but for `enqueue`, and let other Python threads run meanwhile. The results lie in the query's memory, where nothing touches them
-    as long as anybody has them: a call that finds its memory in use takes other memory. What reads an array on another stream must be done when the array goes.
+    Calls wait for their results, but for those that queue, and let other Python threads run meanwhile. The results lie in the query's memory, where nothing touches
+    them as long as anybody has them: a call that finds its memory in use takes other memory. What reads an array on another stream must be done when the array goes.
     A query takes one call at a time: a second thread gets RuntimeError.
     """
 
-    __slots__ = ("_assets", "_core", "_deforming", "_given", "_positions", "_step", "__weakref__")
+    __slots__ = ("_assets", "_core", "_deforming", "_given", "_positions", "_probe_step", "_step", "__weakref__")
 
     def __init__(self, assets: Iterable[Asset], *, device: int = 0, contents: Literal["all", "exact", "manifolds"] = "all", deforming: Iterable[int] = (),
                  stream: Any = None):
@@ -304,6 +341,7 @@ class Query:
         self._core = _cuda.Query(self._assets)
         self._given: Any = None  # the pairs of the last contacts()
         self._step: _cuda.Step | None = None
+        self._probe_step: _cuda.ProbeStep | None = None
 
     @property
     def device(self) -> int:
@@ -437,9 +475,7 @@ class Query:
         The others: as of `tandem.Scene.closest`.
         """
         bodies, _, _, on = self._about(instances, asset, pose, None, None, stream)
-        return Rows(self._core.closest(bodies, points, None if reach is None else amount(reach, "reach", np.inf),
-                                       amount(absolute_tolerance, "absolute_tolerance", np.inf), amount(relative_tolerance, "relative_tolerance", np.inf),
-                                       flag(sides, "sides"), on), CLOSEST_POINT)
+        return Rows(self._core.closest(bodies, self._points(points, reach, absolute_tolerance, relative_tolerance, sides, on), on), CLOSEST_POINT)
 
     def rays(self, origins: Any, directions: Any, instances: Instances | None = None, *, asset: Any = None, pose: Any = None, reach: float | None = None,
              hits: Literal["first", "any", "all"] = "first", stream: Any = None) -> Rows:
@@ -451,7 +487,14 @@ class Query:
         The others: as of `tandem.Scene.rays`.
         """
         bodies, _, _, on = self._about(instances, asset, pose, None, None, stream)
-        return Rows(self._core.rays(bodies, origins, directions, None if reach is None else amount(reach, "reach", np.inf), _choice("hits", hits, _HITS), on), RAY_HIT)
+        return Rows(self._core.rays(bodies, self._rays(origins, directions, reach, hits, on), on), RAY_HIT)
+
+    def _points(self, points: Any, reach: float | None, absolute_tolerance: float, relative_tolerance: float, sides: bool, stream: _cuda.Stream) -> _cuda.Points:
+        return _cuda.Points(points, None if reach is None else amount(reach, "reach", np.inf), amount(absolute_tolerance, "absolute_tolerance", np.inf),
+                            amount(relative_tolerance, "relative_tolerance", np.inf), flag(sides, "sides"), stream, self.device)
+
+    def _rays(self, origins: Any, directions: Any, reach: float | None, hits: str, stream: _cuda.Stream) -> _cuda.Rays:
+        return _cuda.Rays(origins, directions, None if reach is None else amount(reach, "reach", np.inf), _choice("hits", hits, _HITS), stream, self.device)
 
     def reserve(self, *, instances: int, pairs: int, contacts: int, undecided: int | None = None, mode: Literal["exact", "fast", "boxes"] = "exact",
                 first_contact_only: bool = False, within: float = 0.0, add_error_bounds: bool = False, leave_out_rings: int = 0, sorted: bool = False,
@@ -483,3 +526,33 @@ class Query:
         bodies, given, chosen, on = self._about(instances, asset, pose, pairs, filter, stream)
         self._step.enqueue(bodies, given, chosen, on)
         return Queued(self._step, bodies, given, chosen)
+
+    def reserve_probes(self, *, instances: int, probes: int, hits: int = 0, words: int = 0) -> None:
+        """Makes room for calls of `enqueue_closest` and `enqueue_rays`. What was queued before keeps its own room.
+
+        Args:
+            probes: points or rays.
+            hits: where all hits of rays are asked for: that many, and those that float64 gives up again.
+            words: 32-bit words of a coordinate in exact arithmetic; 0: 8, which are enough but for coordinates of very different sizes.
+        """
+        self._probe_step = _cuda.ProbeStep(self._assets, whole_number(instances, "instances", 0, _MOST), whole_number(probes, "probes", 0, _MOST),
+                                           whole_number(hits, "hits", 0, _MOST), whole_number(words, "words", 0, 66))
+
+    def enqueue_closest(self, points: Any, instances: Instances | None = None, *, asset: Any = None, pose: Any = None, reach: float | None = None,
+                        absolute_tolerance: float = 0.0, relative_tolerance: float = 0.0, sides: bool = False, stream: Any = None) -> QueuedProbes:
+        """Queues what `closest` asks, as `enqueue` queues contacts: it neither waits nor allocates, and may be captured into a CUDA graph."""
+        step, (bodies, _, _, on) = self._reserved_probes(), self._about(instances, asset, pose, None, None, stream)
+        given = self._points(points, reach, absolute_tolerance, relative_tolerance, sides, on)
+        return QueuedProbes(step, bodies, given, Rows(step.enqueue_closest(bodies, given, on), CLOSEST_POINT))
+
+    def enqueue_rays(self, origins: Any, directions: Any, instances: Instances | None = None, *, asset: Any = None, pose: Any = None, reach: float | None = None,
+                     hits: Literal["first", "any", "all"] = "first", stream: Any = None) -> QueuedProbes:
+        """Queues what `rays` asks, as `enqueue` queues contacts: it neither waits nor allocates, and may be captured into a CUDA graph."""
+        step, (bodies, _, _, on) = self._reserved_probes(), self._about(instances, asset, pose, None, None, stream)
+        given = self._rays(origins, directions, reach, hits, on)
+        return QueuedProbes(step, bodies, given, Rows(step.enqueue_rays(bodies, given, on), RAY_HIT))
+
+    def _reserved_probes(self) -> _cuda.ProbeStep:
+        if self._probe_step is None:
+            raise ValueError("nothing is reserved: call reserve_probes() first")
+        return self._probe_step

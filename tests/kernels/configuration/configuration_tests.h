@@ -20,7 +20,7 @@ using test::FilterArrays;
 using test::random_filter;
 using Rows = std::vector<ConfigurationPair>;
 
-inline constexpr std::uint32_t kConfigurations = 60;
+inline constexpr std::uint32_t kConfigurations = 60, kMostNearPairs = 10;
 
 // A crowd of bodies of which some move: the others stand, one of them removed.
 struct Question {
@@ -43,53 +43,56 @@ struct Question {
   ConfigurationOptions options() const { return {.bodies = bodies, .poses = poses}; }
 };
 
-// Finds the rows by moving the bodies and asking for contacts, one configuration after the other.
-inline Rows by_contacts(const Question& question, const PairFilter& filter, double within) {
+// Moves the bodies to one configuration after the other: ask(configuration, scene, moves) is told whether a
+// body of a pair moves by moves(pair).
+template <typename Ask>
+void in_each_configuration(const Question& question, const PairFilter& filter, const Ask& ask) {
   Scene scene;
   EXPECT_EQ(scene.set_assets(question.scene.assets.views()), Status::kOk);
   EXPECT_EQ(scene.place(question.scene.instances, filter), Status::kOk);
   EXPECT_EQ(scene.remove(17), Status::kOk);
-  ContactQuery query;
-  Rows rows;
   const std::size_t moving = question.bodies.size();
+  const auto moves = [&](const ObjectPair& pair) {
+    return std::ranges::count(question.bodies, pair.a) + std::ranges::count(question.bodies, pair.b) != 0;
+  };
   for (std::uint32_t i = 0; i < kConfigurations; ++i) {
     const std::span<const Pose> poses = std::span(question.poses).subspan(i * moving, moving);
     EXPECT_EQ(scene.move(question.bodies, poses), Status::kOk);
+    ask(i, scene, moves);
+  }
+}
+
+// Finds the rows by asking for contacts in each configuration.
+inline Rows by_contacts(const Question& question, const PairFilter& filter, double within) {
+  ContactQuery query;
+  Rows rows;
+  in_each_configuration(question, filter, [&](std::uint32_t configuration, Scene& scene, const auto& moves) {
     EXPECT_EQ(query.find(scene, {.first_contact_only = true, .within = within}), Status::kOk);
     for (const Contact& contact : query.rows()) {
       const ObjectPair pair = query.pairs()[contact.pair];
-      const auto moves = [&](std::uint32_t body) { return std::ranges::count(question.bodies, body) != 0; };
-      if (moves(pair.a) || moves(pair.b)) rows.push_back({i, pair.a, pair.b, 0, within});
+      if (moves(pair)) rows.push_back({configuration, pair.a, pair.b, 0, within});
     }
-  }
+  });
   std::ranges::sort(rows);
   return rows;
 }
 
 // The least interval of each configuration, of pairs of which one moves at least; none beyond reach.
 inline Rows by_distances(const Question& question, const PairFilter& filter, double reach) {
-  Scene scene;
-  EXPECT_EQ(scene.set_assets(question.scene.assets.views()), Status::kOk);
-  EXPECT_EQ(scene.place(question.scene.instances, filter), Status::kOk);
-  EXPECT_EQ(scene.remove(17), Status::kOk);
   DistanceQuery query;
   Rows rows;
-  const std::size_t moving = question.bodies.size();
-  for (std::uint32_t i = 0; i < kConfigurations; ++i) {
-    const std::span<const Pose> poses = std::span(question.poses).subspan(i * moving, moving);
-    EXPECT_EQ(scene.move(question.bodies, poses), Status::kOk);
+  in_each_configuration(question, filter, [&](std::uint32_t configuration, Scene& scene, const auto& moves) {
     EXPECT_EQ(query.find(scene, {.reach = reach}), Status::kOk);
-    ConfigurationPair least = {i, kNoIndex, kNoIndex, HUGE_VAL, HUGE_VAL};
+    ConfigurationPair least = {configuration, kNoIndex, kNoIndex, HUGE_VAL, HUGE_VAL};
     for (std::size_t k = 0; k < query.rows().size(); ++k) {
       const ObjectPair pair = query.pairs()[k];
-      const auto moves = [&](std::uint32_t body) { return std::ranges::count(question.bodies, body) != 0; };
-      if (!moves(pair.a) && !moves(pair.b)) continue;
+      if (!moves(pair)) continue;
       least.lower = std::min(least.lower, query.rows()[k].lower);
       if (query.rows()[k].upper < least.upper)
         least.a = pair.a, least.b = pair.b, least.upper = query.rows()[k].upper;
     }
     if (least.upper < HUGE_VAL) rows.push_back(least);
-  }
+  });
   return rows;
 }
 
@@ -196,6 +199,10 @@ TYPED_TEST_P(ConfigurationsOn, AreAsNearAsTheNearestPairOfTheMovedSceneWhateverT
         if (threads > 1) {
           EXPECT_EQ(query.counters(), counted);
           EXPECT_TRUE(std::ranges::equal(query.rows(), found));
+        }
+        // Most of the 333 pairs are passed over, as their boxes are farther apart than the nearest bodies.
+        if (parts == 0) {
+          EXPECT_LT(query.counters().object_pairs, kConfigurations * kMostNearPairs);
         }
         counted = query.counters();
         found.assign(query.rows().begin(), query.rows().end());

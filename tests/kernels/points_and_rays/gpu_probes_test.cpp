@@ -13,8 +13,7 @@
 #include "kernels/geometry/triangle_distance.h"
 #include "kernels/points_and_rays/hostile_probes.h"
 #include "kernels/refit/bent_mesh.h"
-#include "tandem/kernels/gpu_closest_query.h"
-#include "tandem/kernels/gpu_ray_query.h"
+#include "tandem/kernels/gpu_probe_query.h"
 #include "tandem/kernels/gpu_scene.h"
 
 // Points and rays on a GPU against the CPU, whose own tests compare with rational numbers.
@@ -406,7 +405,7 @@ struct OnGpu {
 
 TEST_F(GpuTest, RoomThatRunsOutIsReportedAndMade) {
   const OnGpu on;
-  GpuRayQuery query;
+  GpuProbeQuery query;
   ASSERT_EQ(query.set_assets(on.scene.assets(), nullptr), Status::kOk);
   EXPECT_EQ(query.enqueue(on.scene.instances(), on.options(RayHits::first), nullptr), Status::kOutOfRange);
   ASSERT_EQ(query.reserve({60, on.count(), 10, 0}), Status::kOk);
@@ -419,7 +418,7 @@ TEST_F(GpuTest, RoomThatRunsOutIsReportedAndMade) {
   EXPECT_NE(query.report().complete, 0u);
   std::printf("%u rays, %u not decided by float64, %u hits\n", on.count(), query.report().exact,
               query.report().rows);
-  const auto found = test::download(query.rows(), query.report().rows);
+  const auto found = test::download(query.hits(), query.report().rows);
   Scene cpu;
   ASSERT_EQ(cpu.set_assets(on.bodies.assets.views()), Status::kOk);
   ASSERT_EQ(cpu.place(on.bodies.instances), Status::kOk);
@@ -433,31 +432,50 @@ TEST_F(GpuTest, ProbesHaveTheSameBytesOnEveryRun) {
   std::vector<ClosestPoint> points;
   std::vector<RayHit> hits;
   for (int run = 0; run < 3; ++run) {
-    GpuClosestQuery closest;
-    GpuRayQuery rays;
+    GpuProbeQuery closest, rays;
     ASSERT_EQ(closest.set_assets(on.scene.assets(), nullptr), Status::kOk);
     ASSERT_EQ(rays.set_assets(on.scene.assets(), nullptr), Status::kOk);
     ASSERT_EQ(closest.find(on.scene.instances(), on.closest(), nullptr), Status::kOk);
     ASSERT_EQ(rays.find(on.scene.instances(), on.options(RayHits::any), nullptr), Status::kOk);
-    const auto these = test::download(closest.rows(), on.count());
-    const auto those = test::download(rays.rows(), rays.report().rows);
+    const auto these = test::download(closest.closest(), on.count());
+    const auto those = test::download(rays.hits(), rays.report().rows);
     if (run == 0) points = these, hits = those;
     EXPECT_EQ(std::memcmp(these.data(), points.data(), these.size() * sizeof(ClosestPoint)), 0) << run;
     EXPECT_EQ(std::memcmp(those.data(), hits.data(), those.size() * sizeof(RayHit)), 0) << run;
   }
 }
 
+TEST_F(GpuTest, OneQueryAnswersPointsAndRaysInTurn) {
+  const OnGpu on;
+  GpuProbeQuery alone, both;
+  ASSERT_EQ(alone.set_assets(on.scene.assets(), nullptr), Status::kOk);
+  ASSERT_EQ(both.set_assets(on.scene.assets(), nullptr), Status::kOk);
+  ASSERT_EQ(alone.find(on.scene.instances(), on.closest(), nullptr), Status::kOk);
+  const auto points = test::download(alone.closest(), on.count());
+  for (const RayHits hits : {RayHits::all, RayHits::first, RayHits::all}) {
+    ASSERT_EQ(alone.find(on.scene.instances(), on.options(hits), nullptr), Status::kOk);
+    ASSERT_EQ(both.find(on.scene.instances(), on.options(hits), nullptr), Status::kOk);
+    ASSERT_EQ(both.report().rows, alone.report().rows);
+    expect_same_hits(test::download(both.hits(), both.report().rows),
+                     test::download(alone.hits(), alone.report().rows));
+    ASSERT_EQ(both.find(on.scene.instances(), on.closest(), nullptr), Status::kOk);
+    ASSERT_EQ(both.report().rows, on.count());
+    EXPECT_EQ(both.report().counters.hits, 0u);
+    const auto these = test::download(both.closest(), on.count());
+    EXPECT_EQ(std::memcmp(these.data(), points.data(), these.size() * sizeof(ClosestPoint)), 0);
+  }
+}
+
 TEST_F(GpuTest, ProbesAreCapturedIntoAGraph) {
   const OnGpu on;
   test::GraphStream stream;
-  GpuClosestQuery closest;
-  GpuRayQuery rays;
+  GpuProbeQuery closest, rays;
   ASSERT_EQ(closest.set_assets(on.scene.assets(), nullptr), Status::kOk);
   ASSERT_EQ(rays.set_assets(on.scene.assets(), nullptr), Status::kOk);
   ASSERT_EQ(closest.find(on.scene.instances(), on.closest(), nullptr), Status::kOk);
   ASSERT_EQ(rays.find(on.scene.instances(), on.options(RayHits::all), nullptr), Status::kOk);
-  const auto points = test::download(closest.rows(), on.count());
-  const auto hits = test::download(rays.rows(), rays.report().rows);
+  const auto points = test::download(closest.closest(), on.count());
+  const auto hits = test::download(rays.hits(), rays.report().rows);
   stream.capture([&] {
     const Status status = closest.enqueue(on.scene.instances(), on.closest(), stream.get());
     return status == Status::kOk ? rays.enqueue(on.scene.instances(), on.options(RayHits::all), stream.get())
@@ -467,16 +485,15 @@ TEST_F(GpuTest, ProbesAreCapturedIntoAGraph) {
     stream.launch();
     ASSERT_NE(closest.report().complete, 0u);
     ASSERT_EQ(rays.report().rows, hits.size());
-    const auto these = test::download(closest.rows(), on.count());
+    const auto these = test::download(closest.closest(), on.count());
     EXPECT_EQ(std::memcmp(these.data(), points.data(), these.size() * sizeof(ClosestPoint)), 0);
-    expect_same_hits(test::download(rays.rows(), rays.report().rows), hits);
+    expect_same_hits(test::download(rays.hits(), rays.report().rows), hits);
   }
 }
 
 TEST_F(GpuTest, WhatIsWrongWithBodiesAndOptionsIsNamed) {
   const OnGpu on;
-  GpuClosestQuery closest;
-  GpuRayQuery rays;
+  GpuProbeQuery closest, rays;
   ASSERT_EQ(closest.set_assets(on.scene.assets(), nullptr), Status::kOk);
   ASSERT_EQ(rays.set_assets(on.scene.assets(), nullptr), Status::kOk);
   BodyScene wrong = crowd(6, 60);

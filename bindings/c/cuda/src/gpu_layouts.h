@@ -32,11 +32,9 @@ struct Same_tandem_gpu_tolerance_capacity { using Ours = GpuToleranceCapacity; u
   TANDEM_SAME(instances); TANDEM_SAME(pairs); TANDEM_SAME(undecided); };
 struct Same_tandem_gpu_tolerance_report { using Ours = GpuToleranceReport; using Theirs = tandem_gpu_tolerance_report; TANDEM_SAME_SIZE();
   TANDEM_SAME(status); TANDEM_SAME(complete); TANDEM_SAME(where); TANDEM_SAME(needed); TANDEM_SAME(world_pairs); TANDEM_SAME(counters); };
-struct Same_tandem_gpu_closest_capacity { using Ours = GpuClosestCapacity; using Theirs = tandem_gpu_closest_capacity; TANDEM_SAME_SIZE();
-  TANDEM_SAME(instances); TANDEM_SAME(points); TANDEM_SAME(words); };
-struct Same_tandem_gpu_closest_report { using Ours = GpuClosestReport; using Theirs = tandem_gpu_closest_report; TANDEM_SAME_SIZE();
-  TANDEM_SAME(status); TANDEM_SAME(complete); TANDEM_SAME(where); TANDEM_SAME(needed); TANDEM_SAME(exact); TANDEM_SAME(counters); };
-struct Same_tandem_gpu_ray_capacity { using Ours = GpuRayCapacity; using Theirs = tandem_gpu_ray_capacity; TANDEM_SAME_SIZE(); TANDEM_SAME(instances);
-  TANDEM_SAME(rays); TANDEM_SAME(hits); TANDEM_SAME(words); };
-struct Same_tandem_gpu_ray_report { using Ours = GpuRayReport; using Theirs = tandem_gpu_ray_report; TANDEM_SAME_SIZE(); TANDEM_SAME(status);
+struct Same_tandem_gpu_probe_capacity { using Ours = GpuProbeCapacity; using Theirs = tandem_gpu_probe_capacity; TANDEM_SAME_SIZE();
+  TANDEM_SAME(instances); TANDEM_SAME(probes); TANDEM_SAME(hits); TANDEM_SAME(words); };
+struct Same_tandem_gpu_probe_counters { using Ours = GpuProbeCounters; using Theirs = tandem_gpu_probe_counters; TANDEM_SAME_SIZE();
+  TANDEM_SAME(probes); TANDEM_SAME(hits); TANDEM_SAME(blocks); TANDEM_SAME(by_float64); };
+struct Same_tandem_gpu_probe_report { using Ours = GpuProbeReport; using Theirs = tandem_gpu_probe_report; TANDEM_SAME_SIZE(); TANDEM_SAME(status);
   TANDEM_SAME(complete); TANDEM_SAME(where); TANDEM_SAME(needed); TANDEM_SAME(rows); TANDEM_SAME(exact); TANDEM_SAME(counters); };

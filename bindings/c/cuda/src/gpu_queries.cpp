@@ -26,8 +26,7 @@ struct tandem_gpu_contact_query : GpuHandle<GpuContactQuery> {
 struct tandem_gpu_manifolds : GpuHandle<GpuManifoldQuery> {};
 struct tandem_gpu_containment_query : GpuHandle<GpuContainmentQuery> {};
 struct tandem_gpu_distance_query : GpuHandle<GpuDistanceQuery> {};
-struct tandem_gpu_closest_query : GpuHandle<GpuClosestQuery> {};
-struct tandem_gpu_ray_query : GpuHandle<GpuRayQuery> {};
+struct tandem_gpu_probe_query : GpuHandle<GpuProbeQuery> {};
 struct tandem_gpu_impact_query : GpuHandle<GpuImpactQuery> {};
 struct tandem_gpu_tolerance_query : GpuHandle<GpuToleranceQuery> {};
 
@@ -177,6 +176,23 @@ tandem_status ask_moving(tandem_gpu_impact_query* query, const Asked& asked, con
   });
 }
 
+// Calls about instances alone.
+template <typename Given>
+tandem_status enqueue_probes(tandem_gpu_probe_query* query, const tandem_gpu_instances* instances,
+                             const Given* given, tandem_stream stream) {
+  return ask(
+      query, {instances, nullptr, stream, true}, given,
+      [&](auto& self, auto& bodies, auto&, auto& options) { return self.enqueue(bodies, options, stream); });
+}
+
+template <typename Given>
+tandem_status find_probes(tandem_gpu_probe_query* query, const tandem_gpu_instances* instances,
+                          const Given* given, tandem_stream stream) {
+  return ask(
+      query, {instances, nullptr, stream, true}, given,
+      [&](auto& self, auto& bodies, auto&, auto& options) { return self.find(bodies, options, stream); });
+}
+
 }  // namespace
 
 // All but the tolerance query look at the first level that an asset shows.
@@ -192,8 +208,7 @@ TANDEM_GPU_QUERY(tandem_gpu_manifolds, tandem_gpu_manifold_report)
 TANDEM_GPU_QUERY(tandem_gpu_containment_query, tandem_gpu_containment_report)
 TANDEM_GPU_QUERY(tandem_gpu_distance_query, tandem_gpu_distance_report)
 TANDEM_GPU_QUERY(tandem_gpu_impact_query, tandem_gpu_impact_report)
-TANDEM_GPU_QUERY(tandem_gpu_closest_query, tandem_gpu_closest_report)
-TANDEM_GPU_QUERY(tandem_gpu_ray_query, tandem_gpu_ray_report)
+TANDEM_GPU_QUERY(tandem_gpu_probe_query, tandem_gpu_probe_report)
 TANDEM_GPU_HANDLE(tandem_gpu_tolerance_query, tandem_gpu_tolerance_report)
 
 tandem_status tandem_gpu_contact_query_reserve(tandem_gpu_contact_query* query,
@@ -402,34 +417,41 @@ const tandem_verdict* tandem_gpu_tolerance_query_verdicts(const tandem_gpu_toler
   return rows_of<tandem_verdict>(query, &GpuToleranceQuery::verdicts);
 }
 
-tandem_status tandem_gpu_closest_query_reserve(tandem_gpu_closest_query* query,
-                                               const tandem_gpu_closest_capacity* capacity) {
-  return reserve<GpuClosestCapacity>(query, capacity);
+tandem_status tandem_gpu_probe_query_reserve(tandem_gpu_probe_query* query,
+                                             const tandem_gpu_probe_capacity* capacity) {
+  return reserve<GpuProbeCapacity>(query, capacity);
 }
 
-tandem_status tandem_gpu_ray_query_reserve(tandem_gpu_ray_query* query,
-                                           const tandem_gpu_ray_capacity* capacity) {
-  return reserve<GpuRayCapacity>(query, capacity);
+tandem_status tandem_gpu_probe_query_enqueue_closest(tandem_gpu_probe_query* query,
+                                                     const tandem_gpu_instances* instances,
+                                                     const tandem_gpu_closest_options* given,
+                                                     tandem_stream stream) {
+  return enqueue_probes(query, instances, given, stream);
 }
 
-// Questions about instances alone: how they are queued, how they are asked, and their rows.
-#define TANDEM_GPU_PROBES(handle, of_query, given_options, row)                                              \
-  tandem_status handle##_enqueue(handle* query, const tandem_gpu_instances* instances,                       \
-                                 const given_options* given, tandem_stream stream) {                         \
-    return ask(query, {instances, nullptr, stream, true}, given,                                             \
-               [&](auto& self, auto& bodies, auto&, auto& options) {                                         \
-                 return self.enqueue(bodies, options, stream);                                               \
-               });                                                                                           \
-  }                                                                                                          \
-  tandem_status handle##_find(handle* query, const tandem_gpu_instances* instances,                          \
-                              const given_options* given, tandem_stream stream) {                            \
-    return ask(                                                                                              \
-        query, {instances, nullptr, stream, true}, given,                                                    \
-        [&](auto& self, auto& bodies, auto&, auto& options) { return self.find(bodies, options, stream); }); \
-  }                                                                                                          \
-  const row* handle##_rows(const handle* query) {                                                            \
-    return rows_of<row>(query, &of_query::rows);                                                             \
-  }
+tandem_status tandem_gpu_probe_query_find_closest(tandem_gpu_probe_query* query,
+                                                  const tandem_gpu_instances* instances,
+                                                  const tandem_gpu_closest_options* given,
+                                                  tandem_stream stream) {
+  return find_probes(query, instances, given, stream);
+}
 
-TANDEM_GPU_PROBES(tandem_gpu_closest_query, GpuClosestQuery, tandem_gpu_closest_options, tandem_closest_point)
-TANDEM_GPU_PROBES(tandem_gpu_ray_query, GpuRayQuery, tandem_gpu_ray_options, tandem_ray_hit)
+const tandem_closest_point* tandem_gpu_probe_query_closest(const tandem_gpu_probe_query* query) {
+  return rows_of<tandem_closest_point>(query, &GpuProbeQuery::closest);
+}
+
+tandem_status tandem_gpu_probe_query_enqueue_rays(tandem_gpu_probe_query* query,
+                                                  const tandem_gpu_instances* instances,
+                                                  const tandem_gpu_ray_options* given, tandem_stream stream) {
+  return enqueue_probes(query, instances, given, stream);
+}
+
+tandem_status tandem_gpu_probe_query_find_rays(tandem_gpu_probe_query* query,
+                                               const tandem_gpu_instances* instances,
+                                               const tandem_gpu_ray_options* given, tandem_stream stream) {
+  return find_probes(query, instances, given, stream);
+}
+
+const tandem_ray_hit* tandem_gpu_probe_query_rays(const tandem_gpu_probe_query* query) {
+  return rows_of<tandem_ray_hit>(query, &GpuProbeQuery::hits);
+}

@@ -190,64 +190,6 @@ nb::tuple Query::verdicts(nb::object instances, double tolerance, nb::object giv
                              pairs.count, sizeof(tandem_verdict)));
 }
 
-namespace {
-
-// Numbers of points or directions, (n, 3) float64; `count` becomes n.
-const double* triples_of(const GivenArray& given, std::uint32_t& count) {
-  given.require_type({kF64}, "float64");
-  const std::vector<std::int64_t>& shape = given.shape();
-  if (shape.size() != 2 || shape[1] != 3) given.wrong_shape("(n, 3)");
-  if (shape[0] >= TANDEM_NO_INDEX) given.wrong_shape("fewer than 2^32 - 1 rows");
-  count = static_cast<std::uint32_t>(shape[0]);
-  return static_cast<const double*>(given.data());
-}
-
-}  // namespace
-
-Rows Query::closest(nb::object instances, nb::object points, std::optional<double> reach, double absolute,
-                    double relative, bool sides, const Stream& stream) {
-  const Turn turn(busy_, kBusy);
-  const OnDevice current(device());
-  const Instances& bodies = bodies_of(instances, device());
-  const GivenArray given(points, "points", stream, device());
-  auto options = sized<tandem_gpu_closest_options>();
-  options.points = triples_of(given, options.point_count);
-  options.limit_reach = reach.has_value();
-  options.reach = reach.value_or(0);
-  options.absolute_tolerance = absolute;
-  options.relative_tolerance = relative;
-  options.sides = sides;
-  const auto closest = closest_queries_.take(assets_, stream);
-  ClosestQueries::run(closest, [&](tandem_gpu_closest_query* query) {
-    return tandem_gpu_closest_query_find(query, &bodies.get(), &options, stream);
-  });
-  return {memory_of(closest, stream), tandem_gpu_closest_query_rows(closest.get()), options.point_count,
-          sizeof(tandem_closest_point)};
-}
-
-Rows Query::rays(nb::object instances, nb::object origins, nb::object directions, std::optional<double> reach,
-                 std::uint32_t hits, const Stream& stream) {
-  const Turn turn(busy_, kBusy);
-  const OnDevice current(device());
-  const Instances& bodies = bodies_of(instances, device());
-  const GivenArray from(origins, "origins", stream, device()),
-      along(directions, "directions", stream, device());
-  auto options = sized<tandem_gpu_ray_options>();
-  std::uint32_t count = 0;
-  options.origins = triples_of(from, options.ray_count);
-  options.directions = triples_of(along, count);
-  if (count != options.ray_count) along.wrong_shape("that of origins");
-  options.hits = hits;
-  options.limit_reach = reach.has_value();
-  options.reach = reach.value_or(0);
-  const auto rays = ray_queries_.take(assets_, stream);
-  const auto report = RayQueries::run(rays, [&](tandem_gpu_ray_query* query) {
-    return tandem_gpu_ray_query_find(query, &bodies.get(), &options, stream);
-  });
-  return {memory_of(rays, stream), tandem_gpu_ray_query_rows(rays.get()), report.rows,
-          sizeof(tandem_ray_hit)};
-}
-
 void add_gpu_queries(nb::module_& module) {
   nb::class_<Query>(module, "Query")
       .def(nb::init<nb::object>())
@@ -260,9 +202,8 @@ void add_gpu_queries(nb::module_& module) {
            nb::arg(), nb::arg().none(), nb::arg())
       .def("impacts", &Query::impacts, nb::arg(), nb::arg(), nb::arg(), nb::arg().none(), nb::arg(),
            nb::arg(), nb::arg().none(), nb::arg())
-      .def("closest", &Query::closest, nb::arg(), nb::arg(), nb::arg().none(), nb::arg(), nb::arg(),
-           nb::arg(), nb::arg())
-      .def("rays", &Query::rays, nb::arg(), nb::arg(), nb::arg(), nb::arg().none(), nb::arg(), nb::arg())
+      .def("closest", &Query::probe<Points>)
+      .def("rays", &Query::probe<Rays>)
       .def("verdicts", &Query::verdicts, nb::arg(), nb::arg(), nb::arg().none(), nb::arg().none(), nb::arg());
   nb::class_<Step>(module, "Step")
       .def(nb::init<nb::object, std::uint32_t, std::uint32_t, std::uint64_t, std::uint64_t, std::uint32_t,
@@ -278,6 +219,18 @@ void add_gpu_queries(nb::module_& module) {
       .def("points", &Step::points)
       .def("manifold_report", &Step::manifold_report)
       .def("wait", &Step::wait, nb::arg().none(), nb::arg().none());
+  nb::class_<Points>(module, "Points")
+      .def(nb::init<nb::handle, std::optional<double>, double, double, bool, const Stream&, int>(), nb::arg(),
+           nb::arg().none(), nb::arg(), nb::arg(), nb::arg(), nb::arg(), nb::arg());
+  nb::class_<Rays>(module, "Rays")
+      .def(nb::init<nb::handle, nb::handle, std::optional<double>, std::uint32_t, const Stream&, int>(),
+           nb::arg(), nb::arg(), nb::arg().none(), nb::arg(), nb::arg(), nb::arg());
+  nb::class_<ProbeStep>(module, "ProbeStep")
+      .def(nb::init<nb::object, std::uint32_t, std::uint32_t, std::uint32_t, std::uint32_t>())
+      .def("enqueue_closest", &ProbeStep::enqueue<Points>)
+      .def("enqueue_rays", &ProbeStep::enqueue<Rays>)
+      .def("report", &ProbeStep::report)
+      .def("wait", &ProbeStep::wait, nb::arg().none());
 }
 
 }  // namespace tandem::python

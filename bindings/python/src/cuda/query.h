@@ -75,8 +75,7 @@ using BroadPhases = TANDEM_POOL(tandem_gpu_broad_phase);
 using ContactQueries = TANDEM_POOL(tandem_gpu_contact_query);
 using DistanceQueries = TANDEM_POOL(tandem_gpu_distance_query);
 using ImpactQueries = TANDEM_POOL(tandem_gpu_impact_query);
-using ClosestQueries = TANDEM_POOL(tandem_gpu_closest_query);
-using RayQueries = TANDEM_POOL(tandem_gpu_ray_query);
+using ProbeQueries = TANDEM_POOL(tandem_gpu_probe_query);
 using ToleranceQueries = TANDEM_POOL(tandem_gpu_tolerance_query);
 using ManifoldMakers = TANDEM_POOL(tandem_gpu_manifolds);
 using ContainmentQueries = TANDEM_POOL(tandem_gpu_containment_query);
@@ -87,6 +86,49 @@ struct FoundPairs {
   tandem_gpu_pairs pairs = {};
   std::shared_ptr<const void> owner;
   std::size_t count = 0;
+};
+
+/// Points of the world, somebody's array, and what is asked about them.
+class Points {
+ public:
+  Points(nb::handle points, std::optional<double> reach, double absolute, double relative, bool sides,
+         const Stream& stream, int device);
+  std::uint32_t count() const { return options_.point_count; }
+  tandem_status find(tandem_gpu_probe_query* query, const Instances& bodies, const Stream& stream) const {
+    return tandem_gpu_probe_query_find_closest(query, &bodies.get(), &options_, stream);
+  }
+  tandem_status enqueue(tandem_gpu_probe_query* query, const Instances& bodies, const Stream& stream) const {
+    return tandem_gpu_probe_query_enqueue_closest(query, &bodies.get(), &options_, stream);
+  }
+  static auto rows(const tandem_gpu_probe_query* query) { return tandem_gpu_probe_query_closest(query); }
+  /// The rows that there is room for, where `hits` were reserved.
+  std::uint32_t row_room(std::uint32_t) const { return count(); }
+
+ private:
+  GivenArray points_;
+  tandem_gpu_closest_options options_;
+};
+
+/// Rays of the world, somebody's arrays, and what is asked about them.
+class Rays {
+ public:
+  Rays(nb::handle origins, nb::handle directions, std::optional<double> reach, std::uint32_t hits,
+       const Stream& stream, int device);
+  std::uint32_t count() const { return options_.ray_count; }
+  tandem_status find(tandem_gpu_probe_query* query, const Instances& bodies, const Stream& stream) const {
+    return tandem_gpu_probe_query_find_rays(query, &bodies.get(), &options_, stream);
+  }
+  tandem_status enqueue(tandem_gpu_probe_query* query, const Instances& bodies, const Stream& stream) const {
+    return tandem_gpu_probe_query_enqueue_rays(query, &bodies.get(), &options_, stream);
+  }
+  static auto rows(const tandem_gpu_probe_query* query) { return tandem_gpu_probe_query_rays(query); }
+  std::uint32_t row_room(std::uint32_t hits) const {
+    return options_.hits == TANDEM_ALL_HITS ? hits : count();
+  }
+
+ private:
+  GivenArray origins_, directions_;
+  tandem_gpu_ray_options options_;
 };
 
 class Query {
@@ -107,10 +149,9 @@ class Query {
   nb::tuple verdicts(nb::object instances, double tolerance, nb::object pairs, const GpuFilter* filter,
                      const Stream& stream);
 
-  Rows closest(nb::object instances, nb::object points, std::optional<double> reach, double absolute,
-               double relative, bool sides, const Stream& stream);
-  Rows rays(nb::object instances, nb::object origins, nb::object directions, std::optional<double> reach,
-            std::uint32_t hits, const Stream& stream);
+  /// probes: Points or Rays.
+  template <typename Probes>
+  Rows probe(nb::object instances, const Probes& probes, const Stream& stream);
 
   int device() const { return assets_.device(); }
   const Assets& assets() const { return assets_; }
@@ -144,8 +185,7 @@ class Query {
   DistanceQueries distance_queries_;
   ImpactQueries impact_queries_;
   ToleranceQueries tolerance_queries_;
-  ClosestQueries closest_queries_;
-  RayQueries ray_queries_;
+  ProbeQueries probe_queries_;
   ManifoldMakers::Pointer manifolds_;
   ContainmentQueries::Pointer contained_;
   std::vector<std::shared_ptr<Buffer>> copies_;
@@ -159,8 +199,50 @@ struct ManifoldRoom {
   bool match_previous = false;
 };
 
-/// A step with room for a given scene, which is queued and never waits.
-class Step {
+/// The base of what is queued with room for a given scene, and never waits.
+class QueuedCalls {
+ protected:
+  explicit QueuedCalls(nb::object assets)
+      : assets_object_(assets), assets_(nb::cast<const Assets&>(assets)) {}
+
+  /// Says that a call is about to be queued, or captured, on this stream.
+  void begin(const Stream& stream);
+  /// Waits for `stream`; null: for that of the last call, or, where a call was captured, for all of the
+  /// device's, since its graph may run on any. Throws what was wrong with positions that were queued.
+  void synchronize(const Stream* stream) const;
+  Memory memory_of(std::shared_ptr<const void> owner) const {
+    return {std::move(owner), assets_.device(), stream_, false};
+  }
+
+  nb::object assets_object_;
+  const Assets& assets_;
+  std::atomic<bool> busy_ = false;
+
+ private:
+  Stream stream_;
+  bool captured_ = false;
+};
+
+/// Points and rays that are queued.
+class ProbeStep : QueuedCalls {
+ public:
+  ProbeStep(nb::object assets, std::uint32_t instances, std::uint32_t probes, std::uint32_t hits,
+            std::uint32_t words);
+  /// Returns the room of the rows. probes: Points or Rays.
+  template <typename Probes>
+  Rows enqueue(nb::object instances, nb::object probes, const Stream& stream);
+  Rows report() const;
+  /// As Step::wait().
+  nb::tuple wait(const Stream* stream);
+
+ private:
+  ProbeQueries::Pointer query_;
+  std::uint32_t hit_room_;
+  nb::object instances_, probes_;  // what the stream may still read
+};
+
+/// A step of contacts that is queued.
+class Step : QueuedCalls {
  public:
   Step(nb::object assets, std::uint32_t instances, std::uint32_t pairs, std::uint64_t contacts,
        std::uint64_t undecided, std::uint32_t mode, bool first_contact_only, double within,
@@ -177,18 +259,12 @@ class Step {
   Rows manifolds() const;
   Rows points() const;
   Rows manifold_report() const;
-  /// given: the pairs of the call that is waited for, or None. stream: null: that of the last call, or, where
-  /// a call was captured, all of the device's, since its graph may run on any.
+  /// given: the pairs of the call that is waited for, or None. stream: as of synchronize().
   nb::tuple wait(nb::handle given, const Stream* stream);
 
  private:
-  Memory memory_of(std::shared_ptr<const void> owner) const {
-    return {std::move(owner), assets_.device(), stream_, false};
-  }
   void require_manifolds() const;
 
-  nb::object assets_object_;
-  const Assets& assets_;
   BroadPhases::Pointer broad_phase_;
   ContactQueries::Pointer contacts_;
   ManifoldMakers::Pointer manifolds_;  // null: none are made
@@ -197,9 +273,6 @@ class Step {
   std::uint32_t pair_room_;
   std::uint64_t contact_room_;
   ManifoldRoom manifold_room_;
-  std::atomic<bool> busy_ = false;
-  Stream stream_;
-  bool captured_ = false;
   nb::object instances_, given_, filter_;  // what the stream may still read
 };
 

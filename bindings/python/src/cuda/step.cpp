@@ -2,11 +2,28 @@
 
 namespace tandem::python {
 
+void QueuedCalls::begin(const Stream& stream) {
+  cudaStreamCaptureStatus capture = cudaStreamCaptureStatusNone;
+  check_cuda(cudaStreamIsCapturing(stream, &capture));
+  captured_ = captured_ || capture != cudaStreamCaptureStatusNone;
+  stream_ = stream;
+}
+
+void QueuedCalls::synchronize(const Stream* stream) const {
+  const cudaStream_t waited = stream != nullptr ? *stream : stream_;
+  const bool all = stream == nullptr && captured_;
+  const cudaError_t error = [&] {
+    const WithoutLock other_threads_run;
+    return all ? cudaDeviceSynchronize() : cudaStreamSynchronize(waited);
+  }();
+  check_cuda(error);
+  assets_.check_queued();
+}
+
 Step::Step(nb::object assets, std::uint32_t instances, std::uint32_t pairs, std::uint64_t contacts,
            std::uint64_t undecided, std::uint32_t mode, bool first_contact_only, double within,
            bool add_error_bounds, std::uint32_t leave_out_rings, bool sorted, bool grouped)
-    : assets_object_(assets),
-      assets_(nb::cast<const Assets&>(assets)),
+    : QueuedCalls(assets),
       options_(sized<tandem_gpu_query_options>()),
       near_(sized<tandem_gpu_broad_phase_options>()),
       pair_room_(pairs),
@@ -42,25 +59,22 @@ void Step::enqueue(nb::object instances, nb::object pairs, nb::object filter, co
   const Turn turn(busy_, kBusy);
   const OnDevice current(assets_.device());
   const Instances& bodies = bodies_of(instances, assets_.device());
-  cudaStreamCaptureStatus capture = cudaStreamCaptureStatusNone;
-  check_cuda(cudaStreamIsCapturing(stream, &capture));
-  captured_ = captured_ || capture != cudaStreamCaptureStatusNone;
-  stream_ = stream;
+  begin(stream);
   tandem_gpu_pairs of = {};
   if (pairs.is_none()) {
     near_.filter = filter.is_none() ? nullptr : GpuFilter::of(&nb::cast<const GpuFilter&>(filter), bodies);
-    check_whole(tandem_gpu_broad_phase_enqueue(broad_phase_.get(), &bodies.get(), &near_, stream_));
+    check_whole(tandem_gpu_broad_phase_enqueue(broad_phase_.get(), &bodies.get(), &near_, stream));
     of = tandem_gpu_broad_phase_pairs(broad_phase_.get());
   } else {
     of = nb::cast<const Pairs&>(pairs).get();
   }
-  check_whole(tandem_gpu_contact_query_enqueue(contacts_.get(), &bodies.get(), &of, &options_, stream_));
+  check_whole(tandem_gpu_contact_query_enqueue(contacts_.get(), &bodies.get(), &of, &options_, stream));
   if (manifolds_ != nullptr) {
     auto options = sized<tandem_manifold_options>();
     options.most_points = manifold_room_.most_points;
     options.ignore_previous = !manifold_room_.match_previous;
     check_whole(tandem_gpu_manifolds_enqueue(manifolds_.get(), &bodies.get(), &of, contacts_.get(), &options,
-                                             stream_));
+                                             stream));
   }
   instances_ = instances;
   given_ = pairs;
@@ -119,14 +133,7 @@ Rows Step::manifold_report() const {
 nb::tuple Step::wait(nb::handle given, const Stream* stream) {
   const Turn turn(busy_, kBusy);
   const OnDevice current(assets_.device());
-  const cudaStream_t waited = stream != nullptr ? *stream : stream_;
-  const bool all = stream == nullptr && captured_;
-  const cudaError_t error = [&] {
-    const WithoutLock other_threads_run;
-    return all ? cudaDeviceSynchronize() : cudaStreamSynchronize(waited);
-  }();
-  check_cuda(error);
-  assets_.check_queued();
+  synchronize(stream);
   std::uint64_t pairs = 0;
   if (!given.is_none()) {
     pairs = nb::cast<const Pairs&>(given).count();

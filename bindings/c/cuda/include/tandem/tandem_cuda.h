@@ -586,9 +586,10 @@ TANDEM_API size_t tandem_gpu_tolerance_query_bytes(const tandem_gpu_tolerance_qu
 
 /// ---- Points and rays
 
-/// Finds the closest points of the bodies' surfaces: as certified as tandem_scene_find_closest() finds them,
-/// with the same sides, but not the same bytes (docs/points_and_rays.md).
-typedef struct tandem_gpu_closest_query tandem_gpu_closest_query;
+/// Asks bodies about points and rays, "probes" (docs/points_and_rays.md). Of points it finds what
+/// tandem_scene_find_closest() finds, as certified, with the same sides, but not the same bytes. Of rays it
+/// finds the rows of tandem_scene_find_rays(), byte for byte, but that of any hit another may be named.
+typedef struct tandem_gpu_probe_query tandem_gpu_probe_query;
 
 typedef struct tandem_gpu_closest_options {
   uint32_t struct_size;
@@ -602,50 +603,6 @@ typedef struct tandem_gpu_closest_options {
   uint32_t sides;  ///< 1: `within` and `winding` are asked for
 } tandem_gpu_closest_options;
 
-typedef struct tandem_gpu_closest_capacity {
-  uint32_t instances, points;
-  uint32_t words;  ///< of a coordinate in exact arithmetic; 0: 8
-} tandem_gpu_closest_capacity;
-
-typedef struct tandem_gpu_closest_report {
-  tandem_status status;
-  uint32_t complete;  ///< 0: something did not fit; then rows mean nothing
-  uint64_t where;     ///< the instance or point to blame
-  tandem_gpu_closest_capacity needed;
-  uint32_t exact;  ///< points that float64 did not decide
-  tandem_closest_counters counters;
-} tandem_gpu_closest_report;
-
-TANDEM_API tandem_status tandem_gpu_closest_query_create(const tandem_allocator* allocator,
-                                                         tandem_gpu_closest_query** query);
-TANDEM_API void tandem_gpu_closest_query_destroy(tandem_gpu_closest_query* query);
-/// Result: TANDEM_NO_AXIS_ALIGNED_BLOCKS, where an asset was not uploaded with TANDEM_CONTENTS_ALL.
-TANDEM_API tandem_status tandem_gpu_closest_query_set_assets(tandem_gpu_closest_query* query,
-                                                             tandem_gpu_assets* assets, tandem_stream stream);
-TANDEM_API tandem_status tandem_gpu_closest_query_reserve(tandem_gpu_closest_query* query,
-                                                          const tandem_gpu_closest_capacity* capacity);
-/// Result: TANDEM_BAD_TOLERANCE or TANDEM_BAD_REACH where it is negative or NaN; TANDEM_NO_TOPOLOGY where
-/// sides are asked for and an asset has none; TANDEM_OUT_OF_RANGE for more instances or points than reserved.
-TANDEM_API tandem_status tandem_gpu_closest_query_enqueue(tandem_gpu_closest_query* query,
-                                                          const tandem_gpu_instances* instances,
-                                                          const tandem_gpu_closest_options* options,
-                                                          tandem_stream stream);
-TANDEM_API tandem_status tandem_gpu_closest_query_find(tandem_gpu_closest_query* query,
-                                                       const tandem_gpu_instances* instances,
-                                                       const tandem_gpu_closest_options* options,
-                                                       tandem_stream stream);
-/// Returns the row of each point, in GPU memory.
-TANDEM_API const tandem_closest_point* tandem_gpu_closest_query_rows(const tandem_gpu_closest_query* query);
-TANDEM_API const tandem_gpu_closest_report* tandem_gpu_closest_query_device_report(
-    const tandem_gpu_closest_query* query);
-TANDEM_API tandem_status tandem_gpu_closest_query_get_report(const tandem_gpu_closest_query* query,
-                                                             tandem_gpu_closest_report* report);
-TANDEM_API size_t tandem_gpu_closest_query_bytes(const tandem_gpu_closest_query* query);
-
-/// Finds where rays meet the bodies: the rows of tandem_scene_find_rays(), byte for byte, but that of any hit
-/// another may be named.
-typedef struct tandem_gpu_ray_query tandem_gpu_ray_query;
-
 typedef struct tandem_gpu_ray_options {
   uint32_t struct_size;
   uint32_t hits;         ///< TANDEM_FIRST_HIT, TANDEM_ANY_HIT or TANDEM_ALL_HITS
@@ -657,46 +614,67 @@ typedef struct tandem_gpu_ray_options {
   const uint8_t* looked_at;  ///< as of tandem_gpu_closest_options
 } tandem_gpu_ray_options;
 
-typedef struct tandem_gpu_ray_capacity {
-  uint32_t instances, rays;
-  uint32_t hits;   ///< where all are asked for: rows, and those that float64 gives up again
-  uint32_t words;  ///< as of tandem_gpu_closest_capacity
-} tandem_gpu_ray_capacity;
+typedef struct tandem_gpu_probe_capacity {
+  uint32_t instances;
+  uint32_t probes;  ///< points or rays
+  uint32_t hits;    ///< where all hits are asked for: rows, and those that float64 gives up again
+  uint32_t words;   ///< of a coordinate in exact arithmetic; 0: 8
+} tandem_gpu_probe_capacity;
 
-typedef struct tandem_gpu_ray_report {
+typedef struct tandem_gpu_probe_counters {
+  uint64_t probes;
+  uint64_t hits;        ///< of rays: those that were found
+  uint64_t blocks;      ///< four boxes or four triangles each
+  uint64_t by_float64;  ///< triangles that float64 looked at
+} tandem_gpu_probe_counters;
+
+typedef struct tandem_gpu_probe_report {
   tandem_status status;
   uint32_t complete;  ///< 0: something did not fit; then rows mean nothing
-  uint64_t where;     ///< the instance or ray to blame
-  tandem_gpu_ray_capacity needed;
+  uint64_t where;     ///< the instance, point or ray to blame
+  tandem_gpu_probe_capacity needed;
   uint32_t rows;
-  uint32_t exact;  ///< rays that float64 did not decide
-  tandem_ray_counters counters;
-} tandem_gpu_ray_report;
+  uint32_t exact;  ///< probes that float64 did not decide
+  tandem_gpu_probe_counters counters;
+} tandem_gpu_probe_report;
 
-TANDEM_API tandem_status tandem_gpu_ray_query_create(const tandem_allocator* allocator,
-                                                     tandem_gpu_ray_query** query);
-TANDEM_API void tandem_gpu_ray_query_destroy(tandem_gpu_ray_query* query);
-/// Result: as of tandem_gpu_closest_query_set_assets().
-TANDEM_API tandem_status tandem_gpu_ray_query_set_assets(tandem_gpu_ray_query* query,
-                                                         tandem_gpu_assets* assets, tandem_stream stream);
-TANDEM_API tandem_status tandem_gpu_ray_query_reserve(tandem_gpu_ray_query* query,
-                                                      const tandem_gpu_ray_capacity* capacity);
+TANDEM_API tandem_status tandem_gpu_probe_query_create(const tandem_allocator* allocator,
+                                                       tandem_gpu_probe_query** query);
+TANDEM_API void tandem_gpu_probe_query_destroy(tandem_gpu_probe_query* query);
+/// Result: TANDEM_NO_AXIS_ALIGNED_BLOCKS, where an asset was not uploaded with TANDEM_CONTENTS_ALL.
+TANDEM_API tandem_status tandem_gpu_probe_query_set_assets(tandem_gpu_probe_query* query,
+                                                           tandem_gpu_assets* assets, tandem_stream stream);
+TANDEM_API tandem_status tandem_gpu_probe_query_reserve(tandem_gpu_probe_query* query,
+                                                        const tandem_gpu_probe_capacity* capacity);
+/// Result: TANDEM_BAD_TOLERANCE or TANDEM_BAD_REACH where it is negative or NaN; TANDEM_NO_TOPOLOGY where
+/// sides are asked for and an asset has none; TANDEM_OUT_OF_RANGE for more instances or points than reserved.
+TANDEM_API tandem_status tandem_gpu_probe_query_enqueue_closest(tandem_gpu_probe_query* query,
+                                                                const tandem_gpu_instances* instances,
+                                                                const tandem_gpu_closest_options* options,
+                                                                tandem_stream stream);
+TANDEM_API tandem_status tandem_gpu_probe_query_find_closest(tandem_gpu_probe_query* query,
+                                                             const tandem_gpu_instances* instances,
+                                                             const tandem_gpu_closest_options* options,
+                                                             tandem_stream stream);
+/// Returns the row of each point that was asked about last, in GPU memory.
+TANDEM_API const tandem_closest_point* tandem_gpu_probe_query_closest(const tandem_gpu_probe_query* query);
 /// Result: TANDEM_BAD_REACH where it is negative or NaN; TANDEM_OUT_OF_RANGE for more instances or rays than
 /// reserved, or where all hits are asked for and no room for hits was reserved.
-TANDEM_API tandem_status tandem_gpu_ray_query_enqueue(tandem_gpu_ray_query* query,
-                                                      const tandem_gpu_instances* instances,
-                                                      const tandem_gpu_ray_options* options,
-                                                      tandem_stream stream);
-TANDEM_API tandem_status tandem_gpu_ray_query_find(tandem_gpu_ray_query* query,
-                                                   const tandem_gpu_instances* instances,
-                                                   const tandem_gpu_ray_options* options,
-                                                   tandem_stream stream);
-/// Returns the rows in GPU memory, as many as the report says.
-TANDEM_API const tandem_ray_hit* tandem_gpu_ray_query_rows(const tandem_gpu_ray_query* query);
-TANDEM_API const tandem_gpu_ray_report* tandem_gpu_ray_query_device_report(const tandem_gpu_ray_query* query);
-TANDEM_API tandem_status tandem_gpu_ray_query_get_report(const tandem_gpu_ray_query* query,
-                                                         tandem_gpu_ray_report* report);
-TANDEM_API size_t tandem_gpu_ray_query_bytes(const tandem_gpu_ray_query* query);
+TANDEM_API tandem_status tandem_gpu_probe_query_enqueue_rays(tandem_gpu_probe_query* query,
+                                                             const tandem_gpu_instances* instances,
+                                                             const tandem_gpu_ray_options* options,
+                                                             tandem_stream stream);
+TANDEM_API tandem_status tandem_gpu_probe_query_find_rays(tandem_gpu_probe_query* query,
+                                                          const tandem_gpu_instances* instances,
+                                                          const tandem_gpu_ray_options* options,
+                                                          tandem_stream stream);
+/// Returns the rows of the rays that were asked about last, in GPU memory: as many as the report says.
+TANDEM_API const tandem_ray_hit* tandem_gpu_probe_query_rays(const tandem_gpu_probe_query* query);
+TANDEM_API const tandem_gpu_probe_report* tandem_gpu_probe_query_device_report(
+    const tandem_gpu_probe_query* query);
+TANDEM_API tandem_status tandem_gpu_probe_query_get_report(const tandem_gpu_probe_query* query,
+                                                           tandem_gpu_probe_report* report);
+TANDEM_API size_t tandem_gpu_probe_query_bytes(const tandem_gpu_probe_query* query);
 
 #ifdef __cplusplus
 }

@@ -1,6 +1,6 @@
 #pragma once
-#include "kernels/points_and_rays/probe_walks.cuh"
 #include "kernels/points_and_rays/ray_rows.h"
+#include "kernels/points_and_rays/tree_walk.cuh"
 
 // The search for the hits of one ray through all bodies, by a thread. Decide: what decides about a ray and
 // triangles, each answer no, yes or unsure: meets(ray, corner, meeting) whether the ray meets a triangle
@@ -8,15 +8,13 @@
 namespace tandem::gpu {
 namespace {
 
-constexpr std::uint32_t kRayThreads = 128;
-
 struct RaySearch {
   WorldRay ray;
   double last;  ///< the greatest parameter of the world's ray that counts
   ray::FoundHit best;
   bool found, sure;
-  std::uint32_t hits;  ///< that were listed, where all are asked for
-  Counter blocks = 0, by_float64 = 0;
+  std::uint32_t hits;                                ///< that were listed, where all are asked for
+  Counter all_hits = 0, blocks = 0, by_float64 = 0;  ///< of all rays that this searched for
 };
 
 /// Puts a hit on the list of all hits, in no order; those without room are counted.
@@ -40,7 +38,7 @@ __device__ bool take(const RayArgs& args, std::uint32_t number, std::uint32_t bo
   if (answer == ray::Answer::no) return true;
   search.sure = answer == ray::Answer::yes;
   if (!search.sure) return false;
-  if (args.wanted == RayHits::all) {
+  if (args.asked.hits == RayHits::all) {
     ++search.hits;
     list_hit(args, hit, number, Decide::kExact);
     return true;
@@ -54,7 +52,7 @@ __device__ bool take(const RayArgs& args, std::uint32_t number, std::uint32_t bo
     if (hit.meeting.t.upper < search.last) search.last = hit.meeting.t.upper;
   }
   search.found = true;
-  return search.sure && args.wanted != RayHits::any;
+  return search.sure && args.asked.hits != RayHits::any;
 }
 
 /// Searches one body. False: the search is over.
@@ -84,13 +82,24 @@ __device__ bool search_body(const RayArgs& args, std::uint32_t number, std::uint
   return goes_on;
 }
 
-/// Searches all bodies, and writes the row, but where all hits are asked for. False: it is not decided.
+/// Notes how many hits of a ray were listed, and which walk has them.
 template <typename Decide>
-__device__ bool find_hits(const RayArgs& args, std::uint32_t number, const Decide& decide,
-                          RaySearch& search) {
-  search.ray = world_ray(args.origins + std::uint64_t{3} * number,
-                         args.directions + std::uint64_t{3} * number, args.reach);
-  search.last = args.reach;
+__device__ void note_all_hits(const RayArgs& args, std::uint32_t number, const RaySearch& search) {
+  args.by_exact[number] = !search.sure || Decide::kExact ? 1 : 0;
+  args.hits_of[number] = search.sure ? search.hits : 0;
+  args.placed[number] = 0;
+}
+
+__device__ inline RaySearch search_for(const RayArgs&) {
+  return {};
+}
+
+/// Writes the row of a ray, but where all hits are asked for. False: it is not decided, and not written.
+template <typename Decide>
+__device__ bool answer(const RayArgs& args, std::uint32_t number, const Decide& decide, RaySearch& search) {
+  search.ray = world_ray(args.asked.origins + std::uint64_t{3} * number,
+                         args.asked.directions + std::uint64_t{3} * number, args.asked.reach);
+  search.last = args.asked.reach;
   search.found = false;
   search.sure = true;
   search.hits = 0;
@@ -103,12 +112,15 @@ __device__ bool find_hits(const RayArgs& args, std::uint32_t number, const Decid
   const auto visit = [&](std::uint32_t body) {
     if (!goes_on) return;
     goes_on = search_body(args, number, body, decide, search);
-    // Rounded up, as a bound of a box that is just as far may be.
+    // This is rounded up, as a bound of a box that is just as far may be.
     limit = search.last / search.ray.factor * (1 + 0x1p-50);
   };
   if (args.instances.count != 0) visit_bodies(PlacesOfBodies{args}, first_in, limit, visit);
+  const bool all = args.asked.hits == RayHits::all;
+  if (all) note_all_hits<Decide>(args, number, search);
   if (!search.sure) return false;
-  if (args.wanted == RayHits::all) return true;
+  search.all_hits += all ? search.hits : search.found ? 1 : 0;
+  if (all) return true;
   args.rows[number] =
       search.found ? row_of(number, search.best,
                             args.bodies[search.best.body].triangles[search.best.triangle].source_face())
@@ -116,11 +128,10 @@ __device__ bool find_hits(const RayArgs& args, std::uint32_t number, const Decid
   return true;
 }
 
-/// Adds what the threads of a warp counted.
-__device__ inline void add_search(const RayArgs& args, const RaySearch& search, Counter hits) {
-  add_counts(args.counts->blocks, search.blocks);
-  add_counts(args.counts->by_float64, search.by_float64);
-  add_counts(args.counts->hits, hits);
+__device__ inline void add_counts(const RayArgs& args, const RaySearch& search) {
+  add_up(args.counts->hits, search.all_hits);
+  add_up(args.counts->blocks, search.blocks);
+  add_up(args.counts->by_float64, search.by_float64);
 }
 
 }  // namespace

@@ -1,19 +1,28 @@
 #pragma once
-#include "kernels/points_and_rays/ray_walk.cuh"
+#include "kernels/points_and_rays/point_answer.cuh"
+#include "kernels/points_and_rays/ray_answer.cuh"
 
-// The rays that float64 left, anew, by whole numbers, and the order of all hits of a ray. Each number of
-// words is a file of its own, since they take minutes to compile.
+// The answers about the probes that float64 left, anew, by whole numbers, and the order of all hits of a ray.
+// Each number of words is a file of its own, since they take minutes to compile.
 namespace tandem::gpu {
 namespace {
 
 constexpr std::uint32_t kExactThreads = 64, kExactBlocksPerProcessor = 8;
 
-/// Decides about rays and triangles by whole numbers of so many words; where more are needed, that is noted,
-/// and the query is not complete. The code takes KBs of stack and stands once in a kernel.
+/// Decides by whole numbers of so many words; where more are needed, that is noted, and the query is not
+/// complete. The code takes KBs of stack and stands once in a kernel.
 template <int kWords>
 struct Exactly {
   static constexpr bool kExact = true;
   std::uint32_t& words;
+
+  __device__ __noinline__ bool distance(const TrianglePair& pair, const DistanceTolerance& tolerance,
+                                        TriangleDistance& out) const {
+    if (point_distance_by_float64(pair, tolerance, out)) return true;
+    if (!find_distance<kWords>(pair, tolerance, out))
+      atomicMax(&words, static_cast<std::uint32_t>(exact::exponents_of(pair).words()));
+    return true;
+  }
 
   __device__ bool has_words(const WorldRay& ray, const double (&a)[3][3], const double (&b)[3][3]) const {
     const int needed = tandem::ray::words_of(ray.origin, ray.direction, a, b);
@@ -45,20 +54,16 @@ struct Exactly {
   }
 };
 
-template <int kWords>
-__global__ void __launch_bounds__(kExactThreads) cast(const __grid_constant__ RayArgs args) {
+template <int kWords, typename Options>
+__global__ void __launch_bounds__(kExactThreads)
+    answer_hard(const __grid_constant__ AskedArgs<Options> args) {
   if (args.counts->error != 0) return;
   const std::uint64_t count = args.counts->hard, step = std::uint64_t{gridDim.x} * kExactThreads;
   const Exactly<kWords> decide = {args.counts->words};
-  RaySearch search;
-  Counter hits = 0;
-  for (std::uint64_t i = blockIdx.x * kExactThreads + threadIdx.x; i < count; i += step) {
-    const std::uint32_t number = args.hard[i];
-    find_hits(args, number, decide, search);
-    hits += args.wanted == RayHits::all ? search.hits : search.found;
-    if (args.wanted == RayHits::all) args.hits_of[number] = search.hits;
-  }
-  add_search(args, search, hits);
+  auto search = search_for(args);
+  for (std::uint64_t i = blockIdx.x * kExactThreads + threadIdx.x; i < count; i += step)
+    answer(args, args.hard[i], decide, search);
+  add_counts(args, search);
 }
 
 /// The hits of a ray as a heap whose first is the last of all.
@@ -106,7 +111,8 @@ __global__ void __launch_bounds__(kExactThreads) sort(const __grid_constant__ Ra
   for (std::uint64_t i = blockIdx.x * kExactThreads + threadIdx.x; i < args.probe_count; i += step) {
     const std::uint32_t first = args.first_hit[i], count = args.first_hit[i + 1] - first;
     if (count == 0) continue;
-    const WorldRay ray = world_ray(args.origins + 3 * i, args.directions + 3 * i, args.reach);
+    const WorldRay ray =
+        world_ray(args.asked.origins + 3 * i, args.asked.directions + 3 * i, args.asked.reach);
     if (count > 1) HitHeap<kWords>{args, decide, ray, args.ordered + first}.sort(count);
     for (std::uint32_t j = first; j < first + count; ++j) {
       const tandem::ray::FoundHit& hit = args.ordered[j].hit;
@@ -116,17 +122,23 @@ __global__ void __launch_bounds__(kExactThreads) sort(const __grid_constant__ Ra
   }
 }
 
-template <int kWords>
-cudaError_t launch_cast(const RayArgs& args, cudaStream_t stream) {
-  cast<kWords><<<args.limits.processors * kExactBlocksPerProcessor, kExactThreads, 0, stream>>>(args);
-  return cudaGetLastError();
-}
-
-template <int kWords>
-cudaError_t launch_sort(const RayArgs& args, cudaStream_t stream) {
-  sort<kWords><<<args.limits.processors * kExactBlocksPerProcessor, kExactThreads, 0, stream>>>(args);
+/// Launches a kernel whose threads take one probe after another.
+template <typename Args>
+cudaError_t launch_exact(void (*kernel)(Args), const Args& args, cudaStream_t stream) {
+  kernel<<<args.limits.processors * kExactBlocksPerProcessor, kExactThreads, 0, stream>>>(args);
   return cudaGetLastError();
 }
 
 }  // namespace
+
+template <int kWords, typename Options>
+cudaError_t answer_by_words(const AskedArgs<Options>& args, cudaStream_t stream) {
+  return launch_exact(answer_hard<kWords, Options>, args, stream);
+}
+
+template <int kWords>
+cudaError_t sort_hits_by_words(const RayArgs& args, cudaStream_t stream) {
+  return launch_exact(sort<kWords>, args, stream);
+}
+
 }  // namespace tandem::gpu

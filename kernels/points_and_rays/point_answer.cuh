@@ -1,13 +1,11 @@
 #pragma once
 #include "kernels/points_and_rays/closest_search.h"
-#include "kernels/points_and_rays/probe_walks.cuh"
+#include "kernels/points_and_rays/tree_walk.cuh"
 
-// The search of one point through all bodies, by a thread. Decide: what decides a distance, see
-// ClosestSearch.
+// The search of one point through all bodies, by a thread. Decide: distance(pair, tolerance, out) decides a
+// distance, see ClosestSearch.
 namespace tandem::gpu {
 namespace {
-
-constexpr std::uint32_t kClosestThreads = 128;
 
 /// The walk of a point, whose search has the body.
 template <typename Source>
@@ -94,7 +92,7 @@ struct BodySource {
   }
   __device__ bool distance(const TrianglePair& pair, const DistanceTolerance& tolerance,
                            TriangleDistance& out) const {
-    return decide(pair, tolerance, out);
+    return decide.distance(pair, tolerance, out);
   }
 };
 
@@ -117,12 +115,16 @@ __device__ bool search_body(const ProbedBody& body, const Source& source, Closes
   return decided;
 }
 
+__device__ inline ClosestSearch search_for(const PointArgs&) {
+  return {};
+}
+
 /// Writes the row of a point, but for its sides. False: it is not decided, and not written.
 template <typename Decide>
-__device__ bool find_row(const ClosestArgs& args, std::uint32_t number, const Decide& decide,
-                         ClosestSearch& search) {
-  search.tolerance = args.tolerance;
-  search.begin(args.points + std::uint64_t{3} * number, args.beyond_reach);
+__device__ bool answer(const PointArgs& args, std::uint32_t number, const Decide& decide,
+                       ClosestSearch& search) {
+  search.tolerance = args.asked.tolerance;
+  search.begin(args.asked.points + std::uint64_t{3} * number, beyond(args.asked.reach));
   if (!probe::is_in_range(search.point)) return true;
   const BodySource<Decide> source = {args.bodies, decide};
   bool decided = true;
@@ -136,10 +138,15 @@ __device__ bool find_row(const ClosestArgs& args, std::uint32_t number, const De
         });
   }
   if (!decided) return false;
-  ClosestPoint row = search.row(args.reach);
+  ClosestPoint row = search.row(args.asked.reach);
   if (row.body != kNoIndex) row.face = args.bodies[row.body].triangles[row.triangle].source_face();
   args.rows[number] = row;
   return true;
+}
+
+__device__ inline void add_counts(const PointArgs& args, const ClosestSearch& search) {
+  add_up(args.counts->blocks, search.blocks);
+  add_up(args.counts->by_float64, search.by_float64);
 }
 
 }  // namespace

@@ -34,8 +34,8 @@ struct ProbeHost : GpuHost<ProbeState<Report>, Report> {
     return status == Status::kOk ? assets.set(given, all, *this, stream) : status;
   }
 
-  Status follow(const GpuAsset* of_list) {
-    assets.records = of_list;
+  Status follow(const GpuAssetRecords& of_list) {
+    assets.records = of_list.assets;
     return Status::kOk;
   }
 

@@ -201,7 +201,7 @@ Status GpuAssetQuestion<Capacity, Report, Options>::set_assets(std::span<const G
 }
 
 template <typename Capacity, typename Report, typename Options>
-Status GpuAssetQuestion<Capacity, Report, Options>::follow(const GpuAsset* records) {
+Status GpuAssetQuestion<Capacity, Report, Options>::follow(const GpuAssetRecords& records) {
   return this->host_ != nullptr ? this->host_->follow(records) : Status::kOutOfMemory;
 }
 

@@ -85,8 +85,8 @@ struct HostOf<GpuContactReport> : GpuHost<QueryState, GpuContactReport> {
     return known == Status::kOk ? assets.set(given, all, *this, stream) : known;
   }
 
-  Status follow(const GpuAsset* of_list) {
-    assets.records = of_list;
+  Status follow(const GpuAssetRecords& of_list) {
+    assets.records = of_list.assets;
     return Status::kOk;
   }
 

@@ -5,6 +5,7 @@
 #include "kernels/contact/candidate.h"
 #include "kernels/contact/gpu_query_data.h"
 #include "kernels/contact/leaf_planes.h"
+#include "kernels/contact/recorded_pair.h"
 #include "kernels/contact/walk_stack.cuh"
 #include "kernels/geometry/oriented_test.h"
 #include "kernels/geometry/oriented_world_box.h"
@@ -285,13 +286,6 @@ template <class Means>
 struct LeavingOut : Means {
   static constexpr bool kMayLeaveOut = true;
 };
-
-/// Triangles of a candidate, in world coordinates.
-__device__ inline TrianglePair posed_pair(const QueryArgs& args, const PairRecord& record, std::uint32_t a,
-                                          std::uint32_t b) {
-  return tandem::posed_pair(stored_pose(args, record.instance_a), record.triangles_a[a],
-                            stored_pose(args, record.instance_b), record.triangles_b[b]);
-}
 
 /// Takes 3 KB of stack, so its code stands once.
 __device__ __noinline__ inline bool decide_exactly(const TrianglePair& pair) {

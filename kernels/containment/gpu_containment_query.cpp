@@ -73,8 +73,9 @@ struct HostOf<GpuContainmentReport> : GpuHost<ContainmentState, GpuContainmentRe
     return status;
   }
 
-  Status follow(const GpuAsset* of_list) {
-    records = of_list;
+  Status follow(const GpuAssetRecords& of_list) {
+    if (of_list.positions != PositionTypes::float32) return Status::kNotFloat32;
+    records = of_list.assets;
     return Status::kOk;
   }
   cudaError_t take_surfaces(cudaStream_t stream) const {

@@ -5,6 +5,7 @@
 
 #include "kernels/common/frontier.h"
 #include "kernels/contact/candidate.h"
+#include "kernels/contact/recorded_pair.h"
 #include "kernels/geometry/frame_distance.h"
 #include "kernels/geometry/triangle_distance.h"
 #include "tandem/kernels/gpu_distance_query.h"
@@ -160,9 +161,7 @@ __device__ inline double nearness(const DistanceArgs& args, double upper) {
 /// Triangles of a pair, in world coordinates.
 __device__ inline TrianglePair posed_pair(const DistanceArgs& args, std::uint32_t pair, std::uint32_t a,
                                           std::uint32_t b) {
-  const PairRecord& record = args.records[pair].pair;
-  return tandem::posed_pair(stored_pose(args, record.instance_a), record.triangles_a[a],
-                            stored_pose(args, record.instance_b), record.triangles_b[b]);
+  return posed_pair(args, args.records[pair].pair, a, b);
 }
 
 /// The distance of two triangles, and how many words it needs where kWords leave it too wide. Takes KBs of

@@ -66,8 +66,8 @@ struct HostOf<GpuDistanceReport> : GpuHost<DistanceState, GpuDistanceReport> {
     return status == Status::kOk ? assets.set(given, all, *this, stream) : status;
   }
 
-  Status follow(const GpuAsset* of_list) {
-    assets.records = of_list;
+  Status follow(const GpuAssetRecords& of_list) {
+    assets.records = of_list.assets;
     return Status::kOk;
   }
 

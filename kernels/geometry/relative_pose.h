@@ -144,7 +144,7 @@ TANDEM_HD inline bool store_slack(double slack, double largest, float& out) {
 /// axis: apply() of a vertex v is then within posing_error() of the image in real arithmetic of the stored
 /// point s. By |R_i . (v - s)| <= sum |R_ik| rounding_k, and |v_k| <= reach_k + rounding_k in the bound of
 /// apply() itself, what has to be added to 4.01 u reach_k is (1 + 4.01 u) rounding_k.
-inline void widen_for_rounding(const double (&rounding)[3], TreeExtent& extent) {
+TANDEM_HD inline void widen_for_rounding(const double (&rounding)[3], TreeExtent& extent) {
   constexpr double kFactor = (1 + 0x1p-40) * (1 / (4.01 * relative_pose_detail::kU64));
   for (int k = 0; k < 3; ++k) extent.posed_reach[k] = extent.reach[k] + kFactor * rounding[k];
 }

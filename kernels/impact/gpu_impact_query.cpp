@@ -93,8 +93,9 @@ struct HostOf<GpuImpactReport> : GpuHost<ImpactState, GpuImpactReport> {
     return status == Status::kOk ? assets.set(given, all, *this, stream) : status;
   }
 
-  Status follow(const GpuAsset* of_list) {
-    assets.records = of_list;
+  Status follow(const GpuAssetRecords& of_list) {
+    if (of_list.positions != PositionTypes::float32) return Status::kNotFloat32;
+    assets.records = of_list.assets;
     return keep(contacts.follow(of_list), contacts);
   }
 

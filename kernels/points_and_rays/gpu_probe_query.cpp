@@ -91,8 +91,8 @@ struct HostOf<GpuProbeReport> : GpuHost<ProbeState, GpuProbeReport> {
     return status == Status::kOk ? make_surfaces(given, stream) : status;
   }
 
-  Status follow(const GpuAsset* of_list) {
-    assets.records = of_list;
+  Status follow(const GpuAssetRecords& of_list) {
+    assets.records = of_list.assets;
     return Status::kOk;
   }
 

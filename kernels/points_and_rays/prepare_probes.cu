@@ -40,6 +40,7 @@ __device__ WorldBox make_body(const ProbeArgs& args, std::uint32_t i, ProbedBody
   body.frame = local_frame(body.pose, asset.extent, asset.lower, asset.upper);
   body.blocks = asset.tree.blocks;
   body.triangles = asset.tree.triangles;
+  body.precise = asset.tree.precise;
   body.asset = number;
   return box;
 }

@@ -39,6 +39,7 @@ struct ProbedBody {
   Pose pose;  ///< of stored coordinates
   const Block* blocks;
   const Triangle* triangles;
+  const PreciseCorners* precise;
   std::uint32_t asset, spare;
 };
 
@@ -191,7 +192,8 @@ struct PlacesOfBodies {
 };
 
 __device__ inline void corners_of(const ProbedBody& body, std::uint32_t triangle, double (&out)[3][3]) {
-  pose_corners(body.pose, body.triangles[triangle], nullptr, out);
+  pose_corners(body.pose, body.triangles[triangle],
+               body.precise != nullptr ? body.precise + triangle : nullptr, out);
 }
 
 #endif

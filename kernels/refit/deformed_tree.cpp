@@ -167,25 +167,28 @@ Status DeformedTree::refit(std::span<const float> positions) {
 void DeformedTree::refit_leaf(Block& block, int node, const double* positions) {
   const std::uint32_t t = block.index[node];
   const auto store = [&](int c, int k, double x) {
-    const float rounded = static_cast<float>(x);
-    triangles_[t].corner[c].position[k] = rounded;
+    triangles_[t].corner[c].position[k] = static_cast<float>(x);
     precise_[t].position[c][k] = x;
-    rounding_[k] = std::max(rounding_[k], std::fabs(x - static_cast<double>(rounded)));  // exact
   };
   set_node(block, node, move_leaf(sources_[t], positions, store), t, NodeKind::leaf);
 }
 
-// A coordinate that underflows is rounded by at most half of the smallest float32 number, as any.
+Status DeformedTree::provide_float64(std::size_t numbers) {
+  return single_.resize(numbers) && precise_.resize(triangles_.size()) ? Status::kOk : Status::kOutOfMemory;
+}
+
+// A coordinate that underflows is rounded by at most half of the smallest float32 number, as any. The
+// difference of a number and its rounding is exact.
 Status DeformedTree::refit(std::span<const double> positions) {
   if (!single_.resize(positions.size())) return Status::kOutOfMemory;
-  bool exact = true;
+  double off[3] = {};
   for (std::size_t i = 0; i < positions.size(); ++i) {
     single_[i] = static_cast<float>(positions[i]);
-    exact = exact && static_cast<double>(single_[i]) == positions[i];
+    off[i % 3] = std::max(off[i % 3], std::fabs(positions[i] - static_cast<double>(single_[i])));
   }
-  if (exact) return refit(single_.view());
+  if (off[0] == 0 && off[1] == 0 && off[2] == 0) return refit(single_.view());
   if (!precise_.resize(triangles_.size())) return Status::kOutOfMemory;
-  for (double& off : rounding_) off = 0;
+  std::copy_n(off, 3, rounding_);
   level_.precise = precise_.data();
   for (Block& block : std::span(blocks_.data(), blocks_.size())) {
     for (int i = 0; i < kNodesPerBlock && block.kind[i] == NodeKind::leaf; ++i)

@@ -23,6 +23,9 @@ class DeformedTree : public Allocated {
   Status refit(std::span<const float> positions);
   Status refit(std::span<const double> positions);
 
+  /// Takes the memory for positions in float64: refit() then takes none. Result: kOk or kOutOfMemory.
+  Status provide_float64(std::size_t numbers);
+
   /// Refits by a way of the caller's, and returns what that returns. positions: as of refit(), or null, where
   /// the leaves' boxes stay.
   double refit_by(Refit way, const float* positions);
@@ -31,7 +34,7 @@ class DeformedTree : public Allocated {
   const LevelView& level() const { return level_; }
 
   /// How far a vertex may be from the corner that the triangles hold, along each axis: 0 where all positions
-  /// are float32 numbers.
+  /// are float32 numbers. It is a bound over all source vertices.
   const double (&rounding() const)[3] { return rounding_; }
 
   /// The surface of all inner boxes divided by that of the box around the tree, by the same of the tree that

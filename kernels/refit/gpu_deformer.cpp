@@ -39,6 +39,7 @@ struct DownloadedLevel {
 template <>
 struct HostOf<GpuDeformReport> : GpuHost<DeformState, GpuDeformReport> {
   RoomArray<Triangle> triangles{*this};
+  RoomArray<PreciseCorners> precise{*this};
   RoomArray<Block> blocks{*this};
   RoomArray<OrientedBlock> oriented{*this};
   RoomArray<Box> roots{*this};
@@ -69,7 +70,8 @@ struct HostOf<GpuDeformReport> : GpuHost<DeformState, GpuDeformReport> {
       if (assets[number].tree.source_vertices == nullptr) return Status::kNoSourceVertices;
     }
     if (status == Status::kOk) status = make_plans(assets, deforming, stream);
-    if (status == Status::kOk) status = copy_trees(assets, deforming, stream);
+    const bool takes_float64 = records.positions == PositionTypes::float32_and_float64;
+    if (status == Status::kOk) status = copy_trees(assets, deforming, takes_float64, stream);
     if (status == Status::kOk) status = upload_plans(stream);
     if (status == Status::kOk) status = list_work(stream);
     if (status == Status::kOk) status = write_records(assets, deforming, records, stream);
@@ -133,7 +135,8 @@ struct HostOf<GpuDeformReport> : GpuHost<DeformState, GpuDeformReport> {
     return Status::kOk;
   }
 
-  Status reserve_trees(std::span<const GpuAsset> assets, std::span<const std::uint32_t> deforming) {
+  Status reserve_trees(std::span<const GpuAsset> assets, std::span<const std::uint32_t> deforming,
+                       bool takes_float64) {
     std::size_t triangle_count = 0, block_count = 0, oriented_count = 0, root_count = 0, check_count = 0;
     for (std::size_t i = 0; i < deforming.size(); ++i) {
       const GpuAsset& asset = assets[deforming[i]];
@@ -144,6 +147,7 @@ struct HostOf<GpuDeformReport> : GpuHost<DeformState, GpuDeformReport> {
       check_count += checks_of(asset.source_vertices);
     }
     Status status = keep(triangles.reserve(triangle_count));
+    if (status == Status::kOk) status = keep(precise.reserve(takes_float64 ? triangle_count : 0));
     if (status == Status::kOk) status = keep(blocks.reserve(block_count));
     if (status == Status::kOk) status = keep(oriented.reserve(oriented_count));
     if (status == Status::kOk) status = keep(roots.reserve(root_count));
@@ -162,8 +166,8 @@ struct HostOf<GpuDeformReport> : GpuHost<DeformState, GpuDeformReport> {
   }
 
   Status copy_trees(std::span<const GpuAsset> assets, std::span<const std::uint32_t> deforming,
-                    cudaStream_t stream) {
-    Status status = reserve_trees(assets, deforming);
+                    bool takes_float64, cudaStream_t stream) {
+    Status status = reserve_trees(assets, deforming, takes_float64);
     if (status == Status::kOk && (!levels.resize(deforming.size()) || !bodies.resize(deforming.size())))
       status = Status::kOutOfMemory;
     Triangle* next_triangle = triangles.data();
@@ -175,6 +179,7 @@ struct HostOf<GpuDeformReport> : GpuHost<DeformState, GpuDeformReport> {
       const GpuAsset& asset = assets[deforming[i]];
       const LevelView& rest = asset.tree;
       DeformingBody body = {};
+      if (takes_float64) body.precise = precise.data() + (next_triangle - triangles.data());
       body.triangles = copied(rest.triangles, rest.triangle_count, next_triangle, status, stream);
       body.blocks = copied(rest.blocks, rest.block_count, next_block, status, stream);
       body.oriented = copied(rest.oriented_blocks, rest.block_count, next_oriented, status, stream);
@@ -188,6 +193,7 @@ struct HostOf<GpuDeformReport> : GpuHost<DeformState, GpuDeformReport> {
       bodies[i] = body;
       levels[i] = rest;
       levels[i].triangles = body.triangles;
+      levels[i].precise = body.precise;
       levels[i].blocks = body.blocks;
       levels[i].oriented_blocks = body.oriented;
     }
@@ -244,6 +250,7 @@ struct HostOf<GpuDeformReport> : GpuHost<DeformState, GpuDeformReport> {
     for (std::size_t i = 0; i < deforming.size(); ++i) {
       run[i] = assets[deforming[i]];
       run[i].tree = levels[i];
+      run[i].tree.precise = nullptr;  // in the file's shape
     }
     for (std::size_t i = 0, end = 0; i < deforming.size(); i = end) {
       for (end = i + 1; end < deforming.size() && deforming[end] == deforming[end - 1] + 1;) ++end;
@@ -260,7 +267,7 @@ struct HostOf<GpuDeformReport> : GpuHost<DeformState, GpuDeformReport> {
 
 namespace tandem {
 
-Status GpuAssetList::set(std::span<const GpuAsset> assets, cudaStream_t stream) {
+Status GpuAssetList::set(std::span<const GpuAsset> assets, PositionTypes positions, cudaStream_t stream) {
   records_ = {};
   if (assets.size() >= kNoIndex) return Status::kOutOfRange;
   Buffer<AssetBounds> bounds;
@@ -270,7 +277,7 @@ Status GpuAssetList::set(std::span<const GpuAsset> assets, cudaStream_t stream) 
   if (error == cudaSuccess) error = bounds_.upload(bounds.view(), stream);
   if (error == cudaSuccess) error = cudaStreamSynchronize(stream);
   if (error != cudaSuccess) return status_of(error);
-  records_ = {assets_.data(), bounds_.data(), static_cast<std::uint32_t>(assets.size())};
+  records_ = {assets_.data(), bounds_.data(), static_cast<std::uint32_t>(assets.size()), positions};
   return Status::kOk;
 }
 
@@ -284,15 +291,17 @@ Status GpuDeformer::begin(std::span<const GpuAsset> assets, std::span<const std:
   return host_ != nullptr ? host_->begin(assets, bodies, records, stream) : Status::kOutOfMemory;
 }
 
-Status GpuDeformer::enqueue(const float* const* positions, cudaStream_t stream) {
+Status GpuDeformer::enqueue(const GpuPositions& positions, cudaStream_t stream) {
   if (host_ == nullptr) return Status::kOutOfMemory;
   if (host_->args.body_count == 0) return Status::kOk;
+  if (positions.in_float64 != nullptr && host_->args.records.positions == PositionTypes::float32)
+    return Status::kNotFloat32;
   gpu::DeformArgs args = host_->args;
   args.positions = positions;
   return host_->keep(gpu::refit_bodies(args, stream));
 }
 
-Status GpuDeformer::deform(const float* const* positions, cudaStream_t stream) {
+Status GpuDeformer::deform(const GpuPositions& positions, cudaStream_t stream) {
   Status status = enqueue(positions, stream);
   if (status == Status::kOk) status = host_->keep(cudaStreamSynchronize(stream));
   return status == Status::kOk && bodies() != 0 ? report().status : status;

@@ -1,3 +1,5 @@
+#include <type_traits>
+
 #include "kernels/common/pair_record.h"
 #include "kernels/refit/refit_data.h"
 
@@ -9,11 +11,44 @@ namespace {
 
 constexpr std::uint32_t kThreads = 256, kLanesPerBlock = 16, kBlocksAtOnce = kThreads / kLanesPerBlock;
 
-__device__ float lesser(float x, float y) {
+template <typename Real>
+__device__ Real lesser(Real x, Real y) {
   return y < x ? y : x;
 }
-__device__ float larger(float x, float y) {
+template <typename Real>
+__device__ Real larger(Real x, Real y) {
   return x < y ? y : x;
+}
+
+/// The next float32 number that is not above x, and not below it.
+__device__ float rounded_down(float x) {
+  return x;
+}
+__device__ float rounded_up(float x) {
+  return x;
+}
+__device__ float rounded_down(double x) {
+  return __double2float_rd(x);
+}
+__device__ float rounded_up(double x) {
+  return __double2float_ru(x);
+}
+
+/// The positions in float32 or float64 that a body is given, or null. Those in float32 come first.
+template <typename Real>
+__device__ const Real* positions_of(const DeformArgs& args, std::uint32_t body) {
+  const float* const in_float32 =
+      args.positions.in_float32 != nullptr ? args.positions.in_float32[body] : nullptr;
+  if constexpr (std::is_same_v<Real, float>) {
+    return in_float32;
+  } else {
+    const bool looks_at_them = in_float32 == nullptr && args.positions.in_float64 != nullptr;
+    return looks_at_them ? args.positions.in_float64[body] : nullptr;
+  }
+}
+
+__device__ bool has_positions(const DeformArgs& args, std::uint32_t body) {
+  return positions_of<float>(args, body) != nullptr || positions_of<double>(args, body) != nullptr;
 }
 
 /// The centre and half-extent of a box along an axis.
@@ -56,44 +91,48 @@ struct BlockLanes {
 
   /// The box around a block's nodes. An imaginary one has the interval [inf, -inf].
   __device__ Interval box_around(const Interval& own, bool is_real) const {
-    const float lower = joined(own.centre - own.half_extent, lesser),
-                upper = joined(own.centre + own.half_extent, larger), centre = midpoint(lower, upper),
+    const float lower = joined(own.centre - own.half_extent, lesser<float>),
+                upper = joined(own.centre + own.half_extent, larger<float>), centre = midpoint(lower, upper),
                 half_extent = is_real ? half_extent_around(centre, own.centre, own.half_extent) : 0;
-    return {centre, joined(half_extent, larger)};
+    return {centre, joined(half_extent, larger<float>)};
   }
 };
 
-/// Shared memory of a thread block that refits a cluster.
-template <bool kFromTriangles>
+/// Shared memory of a thread block that refits a cluster. Input: what the cluster begins with: triangles, by
+/// the type of their positions, or Box.
+template <typename Input>
 struct ClusterMemory {
+  static constexpr bool kFromTriangles = !std::is_same_v<Input, Box>;
   static constexpr std::uint32_t kBoxes =
       kFromTriangles ? kMostClusterBlocks : kMostInputs + kMostClusterBlocks;
+  using Real = std::conditional_t<kFromTriangles, Input, float>;
   RefitBlock block[kMostClusterBlocks];
   std::uint16_t height_end[kMaxDepth];
-  float corner[kFromTriangles ? kMostInputs : 1][3][3];  ///< of the triangles
-  float centre[kBoxes][3], half_extent[kBoxes][3];       ///< of boxes around inputs, and then around blocks
+  Real corner[kFromTriangles ? kMostInputs : 1][3][3];  ///< of the triangles
+  float centre[kBoxes][3], half_extent[kBoxes][3];      ///< of boxes around inputs, and then around blocks
 };
 
 /// A lane moves so many corners at once, so that it waits for memory once for all of them.
 constexpr std::uint32_t kCornersAtOnce = 4;
 
 /// Moves the corners of the cluster's triangles: a lane has a corner at a time.
-__device__ void move_corners(const DeformingBody& body, const RefitCluster& cluster, const float* positions,
-                             ClusterMemory<true>& memory) {
+template <typename Real>
+__device__ void move_corners(const DeformingBody& body, const RefitCluster& cluster, const Real* positions,
+                             ClusterMemory<Real>& memory) {
   const CornerSource* const sources = body.corners + std::size_t{3} * cluster.first_input;
   uint4* const to = reinterpret_cast<uint4*>(body.triangles + cluster.first_input);
-  float* const corners = &memory.corner[0][0][0];
+  Real* const corners = &memory.corner[0][0][0];
   const std::uint32_t count = 3 * cluster.inputs;
   for (std::uint32_t first = threadIdx.x; first < count; first += kCornersAtOnce * kThreads) {
     CornerSource source[kCornersAtOnce] = {};
-    float p[kCornersAtOnce][3];
+    Real p[kCornersAtOnce][3];
 #pragma unroll
     for (std::uint32_t j = 0; j < kCornersAtOnce; ++j) {
       if (first + j * kThreads < count) source[j] = sources[first + j * kThreads];
     }
 #pragma unroll
     for (std::uint32_t j = 0; j < kCornersAtOnce; ++j) {
-      const float* const from = positions + std::size_t{3} * source[j].vertex;
+      const Real* const from = positions + std::size_t{3} * source[j].vertex;
       for (int k = 0; k < 3; ++k) p[j][k] = from[k];
     }
 #pragma unroll
@@ -101,14 +140,21 @@ __device__ void move_corners(const DeformingBody& body, const RefitCluster& clus
       const std::uint32_t i = first + j * kThreads;
       if (i >= count) break;
       for (int k = 0; k < 3; ++k) corners[3 * i + static_cast<std::uint32_t>(k)] = p[j][k];
-      to[i] = {__float_as_uint(p[j][0]), __float_as_uint(p[j][1]), __float_as_uint(p[j][2]), source[j].w};
+      float rounded[3];
+      for (int k = 0; k < 3; ++k) rounded[k] = static_cast<float>(p[j][k]);
+      to[i] = {__float_as_uint(rounded[0]), __float_as_uint(rounded[1]), __float_as_uint(rounded[2]),
+               source[j].w};
+      if constexpr (std::is_same_v<Real, double>) {
+        double* const precise = &body.precise[cluster.first_input].position[0][0];
+        for (int k = 0; k < 3; ++k) precise[3 * i + static_cast<std::uint32_t>(k)] = p[j][k];
+      }
     }
   }
 }
 
-template <bool kFromTriangles>
+template <typename Input>
 __device__ void take_blocks(const DeformArgs& args, const RefitCluster& cluster,
-                            ClusterMemory<kFromTriangles>& memory) {
+                            ClusterMemory<Input>& memory) {
   constexpr std::uint32_t kParts = sizeof(RefitBlock) / sizeof(uint4);
   const uint4* const from = reinterpret_cast<const uint4*>(args.blocks + cluster.first_block);
   uint4* const to = reinterpret_cast<uint4*>(memory.block);
@@ -118,7 +164,7 @@ __device__ void take_blocks(const DeformArgs& args, const RefitCluster& cluster,
 }
 
 __device__ void take_inputs(const DeformArgs& args, const DeformingBody& body, const RefitCluster& cluster,
-                            ClusterMemory<false>& memory) {
+                            ClusterMemory<Box>& memory) {
   for (std::uint32_t i = threadIdx.x; i < cluster.inputs; i += kThreads) {
     const Box& box = body.roots[args.inputs[cluster.first_input + i]];
     for (int k = 0; k < 3; ++k) {
@@ -128,13 +174,14 @@ __device__ void take_inputs(const DeformArgs& args, const DeformingBody& body, c
   }
 }
 
-__device__ Interval around_triangle(const float (&corner)[3][3], std::uint32_t axis) {
-  float lower = corner[0][axis], upper = lower;
+template <typename Real>
+__device__ Interval around_triangle(const Real (&corner)[3][3], std::uint32_t axis) {
+  Real lower = corner[0][axis], upper = lower;
   for (int c = 1; c < 3; ++c) {
     lower = lesser(lower, corner[c][axis]);
     upper = larger(upper, corner[c][axis]);
   }
-  return enclose(lower, upper);
+  return enclose(rounded_down(lower), rounded_up(upper));
 }
 
 /// Stores a lane's share of a refitted block.
@@ -160,9 +207,9 @@ __device__ void store(const DeformingBody& body, const RefitBlock& block, const 
   }
 }
 
-template <bool kFromTriangles>
+template <typename Input>
 __device__ void refit_block(const DeformingBody& body, const RefitBlock& block, bool is_leaf_block,
-                            std::uint32_t box, ClusterMemory<kFromTriangles>& memory) {
+                            std::uint32_t box, ClusterMemory<Input>& memory) {
   const BlockLanes lanes;
   const std::uint32_t below = block.below[lanes.node];
   const bool is_real = below != RefitBlock::kNothing;
@@ -182,38 +229,43 @@ __device__ void refit_block(const DeformingBody& body, const RefitBlock& block, 
   store(body, block, lanes, own, around, size);
 }
 
-/// Returns whether a body has positions and all are sound. A thread block calls it.
-__device__ bool has_sound_positions(const DeformingBody& body, const float* positions) {
-  bool is_bad = positions == nullptr;
+/// Returns whether all positions of a body are sound, if it is given any. A thread block calls it.
+__device__ bool has_sound_positions(const DeformingBody& body, bool is_given_any) {
+  bool is_bad = !is_given_any;
   for (std::uint32_t i = threadIdx.x; !is_bad && i < body.check_count; i += blockDim.x)
     is_bad = body.checks[i].first_bad != kNoIndex;
   return __syncthreads_or(is_bad) == 0;
 }
 
-template <bool kFromTriangles>
+/// Refits clusters of bodies: those that begin with triangles, of bodies whose positions are of type Input;
+/// or those that begin with boxes, of all bodies.
+template <typename Input>
 __global__ void __launch_bounds__(kThreads)
     refit_clusters(const __grid_constant__ DeformArgs args, const RefitWork* work) {
-  __shared__ ClusterMemory<kFromTriangles> memory;
+  __shared__ ClusterMemory<Input> memory;
   wait_for_kernel_before();
   const RefitWork own = work[blockIdx.x];
   const DeformingBody body = args.bodies[own.body];
   const RefitCluster cluster = args.clusters[own.item];
-  const float* const positions = args.positions[own.body];
-  take_blocks(args, cluster, memory);
-  if (!has_sound_positions(body, positions)) return;
-  if constexpr (kFromTriangles) {
+  if constexpr (memory.kFromTriangles) {
+    const Input* const positions = positions_of<Input>(args, own.body);
+    take_blocks(args, cluster, memory);
+    if (!has_sound_positions(body, positions != nullptr)) return;
     move_corners(body, cluster, positions, memory);
   } else {
+    const bool is_given_any = has_positions(args, own.body);
+    take_blocks(args, cluster, memory);
+    if (!has_sound_positions(body, is_given_any)) return;
     take_inputs(args, body, cluster, memory);
   }
-  const std::uint32_t boxes_before = kFromTriangles ? 0 : cluster.inputs;
+  const std::uint32_t boxes_before = memory.kFromTriangles ? 0 : cluster.inputs;
   std::uint32_t begin = 0;
   for (std::uint32_t height = 0; height < cluster.heights; ++height) {
     __syncthreads();
     const std::uint32_t end = memory.height_end[height];
     for (std::uint32_t i = begin + threadIdx.x / kLanesPerBlock; i < end; i += kBlocksAtOnce) {
-      refit_block<kFromTriangles>(body, memory.block[i], kFromTriangles && height == 0, boxes_before + i,
-                                  memory);
+      refit_block<Input>(body, memory.block[i], memory.kFromTriangles && height == 0, boxes_before + i,
+                         memory);
     }
     begin = end;
   }
@@ -241,20 +293,24 @@ __device__ PositionCheck joined(const PositionCheck& a, const PositionCheck& b) 
   for (int k = 0; k < 3; ++k) {
     both.lower[k] = lesser(a.lower[k], b.lower[k]);
     both.upper[k] = larger(a.upper[k], b.upper[k]);
+    both.rounding[k] = larger(a.rounding[k], b.rounding[k]);
   }
   both.first_bad = a.first_bad < b.first_bad ? a.first_bad : b.first_bad;
   return both;
 }
 
-__device__ PositionCheck check_vertices(const float* positions, std::uint64_t begin, std::uint64_t end) {
+template <typename Real>
+__device__ PositionCheck check_vertices(const Real* positions, std::uint64_t begin, std::uint64_t end) {
   PositionCheck own = nothing_checked();
   for (std::uint64_t v = begin + threadIdx.x; v < end; v += kThreads) {
     bool is_sound = true;
     for (int k = 0; k < 3; ++k) {
-      const float x = positions[3 * v + static_cast<std::uint64_t>(k)];
-      is_sound = is_sound && fabsf(x) <= kMaxCoordinate;  // false for NaN
-      own.lower[k] = lesser(own.lower[k], x);
-      own.upper[k] = larger(own.upper[k], x);
+      const Real x = positions[3 * v + static_cast<std::uint64_t>(k)];
+      is_sound = is_sound && fabs(x) <= static_cast<Real>(kMaxCoordinate);  // false for NaN
+      own.lower[k] = lesser(own.lower[k], rounded_down(x));
+      own.upper[k] = larger(own.upper[k], rounded_up(x));
+      if constexpr (std::is_same_v<Real, double>)
+        own.rounding[k] = larger(own.rounding[k], fabs(x - static_cast<double>(static_cast<float>(x))));
     }
     if (!is_sound && own.first_bad == kNoIndex) own.first_bad = static_cast<std::uint32_t>(v);
   }
@@ -266,15 +322,18 @@ __global__ void __launch_bounds__(kThreads) check_positions(const __grid_constan
   wait_for_kernel_before();
   const RefitWork work = args.work[blockIdx.x];
   const DeformingBody& body = args.bodies[work.body];
-  const float* const positions = args.positions[work.body];
-  if (positions == nullptr) return;
+  if (!has_positions(args, work.body)) return;
   const std::uint64_t each = (body.vertices + body.check_count - 1) / body.check_count,
                       begin = each * work.item,
                       end = begin + each < body.vertices ? begin + each : body.vertices;
-  PositionCheck own = check_vertices(positions, begin, end);
+  const float* const in_float32 = positions_of<float>(args, work.body);
+  PositionCheck own = in_float32 != nullptr
+                          ? check_vertices(in_float32, begin, end)
+                          : check_vertices(positions_of<double>(args, work.body), begin, end);
   for (int k = 0; k < 3; ++k) {
-    own.lower[k] = joined_by_warp(own.lower[k], lesser);
-    own.upper[k] = joined_by_warp(own.upper[k], larger);
+    own.lower[k] = joined_by_warp(own.lower[k], lesser<float>);
+    own.upper[k] = joined_by_warp(own.upper[k], larger<float>);
+    own.rounding[k] = joined_by_warp(own.rounding[k], larger<double>);
   }
   own.first_bad = __reduce_min_sync(kAllLanes, own.first_bad);
   if (threadIdx.x % 32 == 0) of_warp[threadIdx.x / 32] = own;
@@ -299,12 +358,16 @@ __device__ Block root_of(const DeformingBody& body) {
   return root;
 }
 
-/// The asset has the shape of its refitted tree.
+/// The asset has the shape of its refitted tree. Positions that are all float32 numbers are what the
+/// triangles hold.
 __device__ void write_record(const DeformingBody& body, const PositionCheck& all,
                              const GpuAssetRecords& records) {
   GpuAsset& asset = records.assets[body.asset];
   AssetBounds& bounds = records.bounds[body.asset];
   asset.extent = extent_of(root_of(body));
+  widen_for_rounding(all.rounding, asset.extent);
+  const bool is_rounded = all.rounding[0] > 0 || all.rounding[1] > 0 || all.rounding[2] > 0;
+  asset.tree.precise = is_rounded ? body.precise : nullptr;
   asset.tree.number = 0;
   asset.tree.error_bound = 0;
   for (int k = 0; k < 3; ++k) {
@@ -325,7 +388,7 @@ __global__ void __launch_bounds__(kFinishThreads) finish(const __grid_constant__
   if (threadIdx.x == 0) first_bad = kNoneIsBad;
   __syncthreads();
   for (std::uint32_t i = threadIdx.x; i < args.body_count; i += kFinishThreads) {
-    if (args.positions[i] == nullptr) continue;
+    if (!has_positions(args, i)) continue;
     const DeformingBody& body = args.bodies[i];
     PositionCheck all = nothing_checked();
     for (std::uint32_t c = 0; c < body.check_count; ++c) all = joined(all, body.checks[c]);
@@ -349,11 +412,14 @@ __global__ void __launch_bounds__(kFinishThreads) finish(const __grid_constant__
 cudaError_t refit_bodies(const DeformArgs& args, cudaStream_t stream) {
   const bool early = args.limits.early_launch;
   cudaError_t error = launch_after({args.work_end[0], kThreads, 0, stream, early}, check_positions, args);
-  for (std::uint32_t round = 0; round < args.rounds && error == cudaSuccess; ++round) {
+  const auto refit_round = [&](std::uint32_t round, auto* kernel) {
     const std::uint32_t begin = args.work_end[round], count = args.work_end[round + 1] - begin;
-    error = launch_after({count, kThreads, 0, stream, early},
-                         round == 0 ? refit_clusters<true> : refit_clusters<false>, args, args.work + begin);
-  }
+    if (error == cudaSuccess)
+      error = launch_after({count, kThreads, 0, stream, early}, kernel, args, args.work + begin);
+  };
+  if (args.positions.in_float32 != nullptr) refit_round(0, refit_clusters<float>);
+  if (args.positions.in_float64 != nullptr) refit_round(0, refit_clusters<double>);
+  for (std::uint32_t round = 1; round < args.rounds; ++round) refit_round(round, refit_clusters<Box>);
   return error == cudaSuccess ? launch_after({1, kFinishThreads, 0, stream, false}, finish, args) : error;
 }
 

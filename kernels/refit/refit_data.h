@@ -15,12 +15,14 @@ struct PositionCheck {
   float lower[3], upper[3];  ///< of all of them, where none is bad
   std::uint32_t first_bad;   ///< vertex that is not finite or beyond kMaxCoordinate; kNoIndex: there is none
   std::uint32_t unused;
+  double rounding[3];  ///< the farthest that a position is from float32 numbers, along each axis
 };
-static_assert(sizeof(PositionCheck) == 32);
+static_assert(sizeof(PositionCheck) == 56);
 
 /// A body that deforms: its own copy of the tree, and where its plan begins.
 struct DeformingBody {
   Triangle* triangles;
+  PreciseCorners* precise;      ///< or null: positions are in float32
   Block* blocks;                ///< or null
   OrientedBlock* oriented;      ///< or null
   Box* roots;                   ///< boxes that go from round to round
@@ -47,7 +49,7 @@ struct DeformArgs {
   const std::uint16_t* height_ends;
   const std::uint32_t* inputs;
   const RefitWork* work;  ///< of the checks, then of each round
-  const float* const* positions;
+  GpuPositions positions;
   GpuAssetRecords records;
   std::uint32_t body_count;
   std::uint32_t rounds;

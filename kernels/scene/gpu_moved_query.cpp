@@ -47,7 +47,9 @@ struct HostOf<GpuMovedReport> : GpuHost<MovedState, GpuMovedReport> {
     return status;
   }
 
-  Status follow(const GpuAsset* of_list) { return of_list == nullptr ? Status::kOk : Status::kDeformed; }
+  Status follow(const GpuAssetRecords& of_list) {
+    return of_list.assets == nullptr ? Status::kOk : Status::kDeformed;
+  }
 
   // The next call enters its pairs anew.
   Status empty_table() {

@@ -34,12 +34,25 @@ struct QueryMemory : DeviceMemory {
   Query query;
 };
 
-/// An asset that deforms, and its positions on the GPU.
+/// An asset that deforms.
 struct DeformingAsset {
   GpuDeformer deformer;
-  GpuArray<float> positions;
-  GpuArray<const float*> place;  // of the positions
+  PositionTypes positions;
 };
+
+/// Positions of an asset on the GPU.
+template <typename Real>
+struct PositionsOnGpu {
+  GpuArray<Real> positions;
+  GpuArray<const Real*> place;  // of the positions
+};
+
+GpuPositions gpu_positions(const float* const* places) {
+  return {.in_float32 = places};
+}
+GpuPositions gpu_positions(const double* const* places) {
+  return {.in_float64 = places};
+}
 
 /// While it lives, a GPU is the current one, and memory comes from an allocator.
 class Here {
@@ -80,15 +93,10 @@ class Gpu final : public SceneDevice {
   }
 
   Status deform(SceneState&, std::uint32_t asset, std::span<const float> positions) override {
-    const Here here(gpu_, allocator);
-    Status status = here.status();
-    if (status == Status::kOk) status = begin_to_deform(asset);
-    if (status != Status::kOk) return status;
-    DeformingAsset& deforming = *deforming_[asset];
-    status = upload(positions, deforming.positions);
-    const float* const place = deforming.positions.data();
-    if (status == Status::kOk) status = upload(std::span(&place, 1), deforming.place);
-    return status == Status::kOk ? deforming.deformer.deform(deforming.place.data(), kStream) : status;
+    return deform(asset, PositionTypes::float32, positions, in_float32_);
+  }
+  Status deform(SceneState&, std::uint32_t asset, std::span<const double> positions) override {
+    return deform(asset, PositionTypes::float32_and_float64, positions, in_float64_);
   }
 
   Status find_pairs(SceneState& scene, double reach, bool& fixed_kept, Buffer<ObjectPair>& pairs) override {
@@ -249,18 +257,36 @@ class Gpu final : public SceneDevice {
         if (!levels_.push(gpu_asset(files_.level(i, l), views[i], l))) return Status::kOutOfMemory;
       }
     }
-    return list_.set(assets_.view(), kStream);
+    return list_.set(assets_.view(), PositionTypes::float32, kStream);
   }
 
-  Status begin_to_deform(std::uint32_t asset) {
+  // Memory is taken first, so that an error leaves the asset as it is.
+  template <typename Real>
+  Status deform(std::uint32_t asset, PositionTypes types, std::span<const Real> positions,
+                PositionsOnGpu<Real>& room) {
+    const Here here(gpu_, allocator);
+    Status status = here.status();
+    if (status == Status::kOk) status = upload(positions, room.positions);
+    const Real* const place = room.positions.data();
+    if (status == Status::kOk) status = upload(std::span(&place, 1), room.place);
+    if (status == Status::kOk) status = begin_to_deform(asset, types);
+    return status == Status::kOk
+               ? deforming_[asset]->deformer.deform(gpu_positions(room.place.data()), kStream)
+               : status;
+  }
+
+  Status begin_to_deform(std::uint32_t asset, PositionTypes positions) {
     if (deforming_ == nullptr)
       deforming_.reset(new (std::nothrow) std::unique_ptr<DeformingAsset>[assets_.size()]);
     if (deforming_ == nullptr) return Status::kOutOfMemory;
-    if (deforming_[asset] != nullptr) return Status::kOk;
-    std::unique_ptr<DeformingAsset> made(new (std::nothrow) DeformingAsset);
+    if (deforming_[asset] != nullptr &&
+        (positions == PositionTypes::float32 || deforming_[asset]->positions == positions))
+      return Status::kOk;
+    std::unique_ptr<DeformingAsset> made(new (std::nothrow) DeformingAsset{{}, positions});
     if (made == nullptr) return Status::kOutOfMemory;
-    const Status status =
-        made->deformer.begin(assets_.view(), std::span(&asset, 1), list_.records(), kStream);
+    GpuAssetRecords records = list_.records();
+    records.positions = positions;
+    const Status status = made->deformer.begin(assets_.view(), std::span(&asset, 1), records, kStream);
     if (status == Status::kOk) deforming_[asset] = std::move(made);
     return status;
   }
@@ -456,7 +482,7 @@ class Gpu final : public SceneDevice {
     }
     query = &static_cast<QueryMemory<Query>&>(*memory).query;
     if constexpr (!takes_levels) {
-      if (deforming_ != nullptr) return query->follow(list_.records().assets);
+      if (deforming_ != nullptr) return query->follow(list_.records());  // the scene refuses float64
     }
     return Status::kOk;
   }
@@ -469,6 +495,8 @@ class Gpu final : public SceneDevice {
   Buffer<GpuAsset> assets_, levels_;                              // the first level of each, and all
   GpuAssetList list_;                                             // of the first levels
   std::unique_ptr<std::unique_ptr<DeformingAsset>[]> deforming_;  // by asset; null: none ever deformed
+  PositionsOnGpu<float> in_float32_;
+  PositionsOnGpu<double> in_float64_;
 
   // The arrays that are copied, and their copies.
   Buffer<std::uint32_t> asset_, group_, mask_;

@@ -76,37 +76,24 @@ Status SceneState::deform(std::uint32_t number, std::span<const Real> positions)
   const std::size_t sound = check_positions(positions, lower, upper);
   if (sound < positions.size() / 3 || !stays_in_range(number, lower, upper))
     return fail(Status::kOutOfRange, sound);
-  if constexpr (std::is_same_v<Real, double>) {
-    if (device != nullptr) return deform_on_device(number, positions);
-  }
   std::unique_ptr<DeformedTree> begun;
   if (asset.deformed == nullptr) begun.reset(new (std::nothrow) DeformedTree);
   DeformedTree* const tree = asset.deformed != nullptr ? asset.deformed : begun.get();
   Status status = tree != nullptr ? Status::kOk : Status::kOutOfMemory;
   if (status == Status::kOk && begun != nullptr) status = begun->begin(asset.tree);
-  if constexpr (std::is_same_v<Real, float>) {
-    if (status == Status::kOk && device != nullptr) {
-      device->allocator = current_allocator();
-      status = device->deform(*this, number, positions);
-    }
+  if constexpr (std::is_same_v<Real, double>) {
+    if (status == Status::kOk && device != nullptr) status = tree->provide_float64(positions.size());
   }
-  if (status == Status::kOk) status = tree->refit(positions);  // of float32 numbers it takes no memory
+  if (status == Status::kOk && device != nullptr) {
+    device->allocator = current_allocator();
+    status = device->deform(*this, number, positions);
+  }
+  if (status == Status::kOk) status = tree->refit(positions);  // behind a device it takes no memory
   if (status != Status::kOk) return fail(status, 0);
   asset.deformed = tree;
   static_cast<void>(begun.release());
   take_shape(number, lower, upper);
   return Status::kOk;
-}
-
-// A device takes float32 numbers. Condition: positions that are sound, as many as there have to be.
-Status SceneState::deform_on_device(std::uint32_t number, std::span<const double> positions) {
-  Buffer<float> single;
-  if (!single.resize(positions.size())) return fail(Status::kOutOfMemory, 0);
-  for (std::size_t i = 0; i < positions.size(); ++i) {
-    single[i] = static_cast<float>(positions[i]);
-    if (static_cast<double>(single[i]) != positions[i]) return fail(Status::kNotFloat32, i / 3);
-  }
-  return deform(number, single.view());
 }
 
 // The asset has the shape that its deformed tree has now, and so have its bodies.

@@ -25,6 +25,7 @@ class SceneDevice : public Allocated {
   /// Gives an asset of the scene, which has source vertices, the positions of them, which are sound. After an
   /// error nothing has changed.
   virtual Status deform(SceneState& scene, std::uint32_t asset, std::span<const float> positions) = 0;
+  virtual Status deform(SceneState& scene, std::uint32_t asset, std::span<const double> positions) = 0;
 
   /// Finds the pairs of world boxes within reach that the filter looks at, a < b, sorted. fixed_kept: whether
   /// the fixed bodies stand as in the last call that set it.

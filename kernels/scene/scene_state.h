@@ -149,7 +149,6 @@ struct SceneState : Allocated {
   Status set_assets(std::span<const AssetView> views);
   template <typename Real>
   Status deform(std::uint32_t asset, std::span<const Real> positions);
-  Status deform_on_device(std::uint32_t asset, std::span<const double> positions);
   void forget_assets();
   Status place(std::span<const Instance> placed, const PairFilter& filter);
   Status add(const Instance& instance, const BodyFilter& filter, std::uint32_t& body);

@@ -66,7 +66,9 @@ struct HostOf<GpuToleranceReport> : GpuHost<ToleranceState, GpuToleranceReport> 
     return Status::kOk;
   }
 
-  Status follow(const GpuAsset* of_list) { return of_list == nullptr ? Status::kOk : Status::kDeformed; }
+  Status follow(const GpuAssetRecords& of_list) {
+    return of_list.assets == nullptr ? Status::kOk : Status::kDeformed;
+  }
 
   // There is room for as many pairs as the contact query has room for.
   Status reserve(const GpuToleranceCapacity& wanted, const GpuNoOptions&) {

@@ -23,21 +23,21 @@ static void check_wrong_deforming(tandem_gpu_assets* of) {
   tandem_gpu_assets* wrong = NULL;
   const uint32_t unknown[] = {0, 3}, descending[] = {2, 1}, last = 2;
   uint64_t where = 7;
-  CHECK_STATUS(tandem_gpu_assets_create_deforming(gpu_assets, unknown, 2, stream, NULL, &wrong, &where),
+  CHECK_STATUS(tandem_gpu_assets_create_deforming(gpu_assets, unknown, 2, 0, stream, NULL, &wrong, &where),
                TANDEM_UNKNOWN_ASSET);
   CHECK(wrong == NULL && where == 1);
-  CHECK_STATUS(tandem_gpu_assets_create_deforming(gpu_assets, descending, 2, stream, NULL, &wrong, &where),
+  CHECK_STATUS(tandem_gpu_assets_create_deforming(gpu_assets, descending, 2, 0, stream, NULL, &wrong, &where),
                TANDEM_BAD_OPTION);
-  CHECK_STATUS(tandem_gpu_assets_create_deforming(of, &last, 1, stream, NULL, &wrong, NULL),
+  CHECK_STATUS(tandem_gpu_assets_create_deforming(of, &last, 1, 0, stream, NULL, &wrong, NULL),
                TANDEM_BAD_OPTION);
-  CHECK_STATUS(tandem_gpu_assets_deform(gpu_assets, NULL, stream), TANDEM_ASSETS_MISSING);
-  CHECK_STATUS(tandem_gpu_assets_deform(of, NULL, stream), TANDEM_NULL_ARGUMENT);
+  CHECK_STATUS(tandem_gpu_assets_deform(gpu_assets, NULL, NULL, stream), TANDEM_ASSETS_MISSING);
+  CHECK_STATUS(tandem_gpu_assets_deform(of, NULL, NULL, stream), TANDEM_NULL_ARGUMENT);
   CHECK_STATUS(tandem_gpu_assets_get_report(gpu_assets, NULL), TANDEM_ASSETS_MISSING);
   CHECK(tandem_gpu_assets_device_report(gpu_assets) == NULL);
   tandem_upload_options contents = {sizeof contents, TANDEM_CONTENTS_EXACT_QUERIES};
   tandem_gpu_assets* part = NULL;
   CHECK_STATUS(tandem_gpu_assets_upload(assets, 3, &contents, stream, NULL, &part, NULL), TANDEM_OK);
-  CHECK_STATUS(tandem_gpu_assets_create_deforming(part, &last, 1, stream, NULL, &wrong, &where),
+  CHECK_STATUS(tandem_gpu_assets_create_deforming(part, &last, 1, 0, stream, NULL, &wrong, &where),
                TANDEM_NO_SOURCE_VERTICES);
   CHECK(where == 0 && tandem_gpu_assets_deforming_count(part) == 0);
   tandem_gpu_assets_release(part);
@@ -60,7 +60,7 @@ static const uint32_t third = 2;
 
 static void begin_deforming(const char* folder) {
   tandem_instance bodies[kBodies];
-  CHECK_STATUS(tandem_gpu_assets_create_deforming(gpu_assets, &third, 1, stream, NULL, &deforming, NULL),
+  CHECK_STATUS(tandem_gpu_assets_create_deforming(gpu_assets, &third, 1, 0, stream, NULL, &deforming, NULL),
                TANDEM_OK);
   CHECK(tandem_gpu_assets_deforming_count(deforming) == 1 && tandem_gpu_assets_count(deforming) == 3);
   CHECK(tandem_gpu_assets_bytes(deforming) > 0);
@@ -88,7 +88,7 @@ static cudaGraphExec_t captured_step(const tandem_gpu_query_options* grouped) {
   CHECK_STATUS(tandem_gpu_contact_query_reserve(queries.contacts, &room, grouped), TANDEM_OK);
   pairs = tandem_gpu_broad_phase_pairs(queries.near);
   cuda_must(cudaStreamBeginCapture(stream, cudaStreamCaptureModeThreadLocal));
-  CHECK_STATUS(tandem_gpu_assets_enqueue_deform(deforming, table, stream), TANDEM_OK);
+  CHECK_STATUS(tandem_gpu_assets_enqueue_deform(deforming, table, NULL, stream), TANDEM_OK);
   CHECK_STATUS(tandem_gpu_broad_phase_enqueue(queries.near, &scene.instances, &sorted, stream), TANDEM_OK);
   CHECK_STATUS(tandem_gpu_contact_query_enqueue(queries.contacts, &scene.instances, &pairs, grouped, stream),
                TANDEM_OK);
@@ -121,9 +121,9 @@ static size_t launch(cudaGraphExec_t step, const Triangles* cow, int is_bad) {
 
 // The queries have references to the assets. A null pointer in the table leaves the asset as it is.
 static void ask_after_release(const tandem_gpu_query_options* grouped) {
-  CHECK_STATUS(tandem_gpu_assets_deform(deforming, table, stream), TANDEM_OUT_OF_RANGE);
+  CHECK_STATUS(tandem_gpu_assets_deform(deforming, table, NULL, stream), TANDEM_OUT_OF_RANGE);
   cuda_must(cudaMemset((void*)table, 0, sizeof on_gpu));
-  CHECK_STATUS(tandem_gpu_assets_deform(deforming, table, stream), TANDEM_OK);
+  CHECK_STATUS(tandem_gpu_assets_deform(deforming, table, NULL, stream), TANDEM_OK);
   tandem_gpu_assets_release(deforming);
   CHECK_STATUS(tandem_gpu_contact_query_find(queries.contacts, &scene.instances, &pairs, grouped, stream),
                TANDEM_OK);
@@ -154,11 +154,57 @@ static void test_deforming(const char* folder) {
   free_gpu_scene(&scene);
 }
 
+// Positions in float64 that are no float32 numbers.
+static void test_float64(const char* folder) {
+  tandem_gpu_assets *precise = NULL, *single = NULL;
+  tandem_gpu_manifolds* refused = NULL;
+  tandem_instance bodies[kBodies];
+  const tandem_gpu_query_options grouped = grouped_contacts();
+  const tandem_gpu_broad_phase_options sorted = sorted_pairs();
+  CHECK_STATUS(tandem_gpu_assets_create_deforming(gpu_assets, &third, 1, 1, stream, NULL, &precise, NULL),
+               TANDEM_OK);
+  CHECK_STATUS(tandem_gpu_assets_create_deforming(gpu_assets, &third, 1, 0, stream, NULL, &single, NULL),
+               TANDEM_OK);
+  CHECK(tandem_gpu_assets_bytes(precise) > tandem_gpu_assets_bytes(single));
+  place(bodies, 0);
+  GpuScene there = scene_to_gpu(bodies, kBodies);
+  tandem_scene* here = cpu_scene(bodies);
+  Triangles cow = waving_cow(folder, 1);
+  double* numbers = (double*)to_gpu(cow.positions, 3 * cow.vertex_count * sizeof(double));
+  const double** places = (const double**)to_gpu(&numbers, sizeof numbers);
+  CHECK_STATUS(tandem_gpu_assets_deform(single, NULL, places, stream), TANDEM_NOT_FLOAT32);
+  CHECK_STATUS(tandem_gpu_assets_deform(precise, NULL, places, stream), TANDEM_OK);
+  CHECK_STATUS(tandem_scene_deform_f64(here, third, cow.positions, cow.vertex_count), TANDEM_OK);
+  CHECK_STATUS(tandem_scene_find_contacts(here, NULL), TANDEM_OK);
+  CHECK_STATUS(tandem_gpu_broad_phase_create(NULL, &queries.near), TANDEM_OK);
+  CHECK_STATUS(tandem_gpu_contact_query_create(NULL, &queries.contacts), TANDEM_OK);
+  CHECK_STATUS(tandem_gpu_broad_phase_set_assets(queries.near, precise), TANDEM_OK);
+  CHECK_STATUS(tandem_gpu_contact_query_set_assets(queries.contacts, precise, stream), TANDEM_OK);
+  CHECK_STATUS(tandem_gpu_broad_phase_find(queries.near, &there.instances, &sorted, stream), TANDEM_OK);
+  pairs = tandem_gpu_broad_phase_pairs(queries.near);
+  CHECK_STATUS(tandem_gpu_contact_query_find(queries.contacts, &there.instances, &pairs, &grouped, stream),
+               TANDEM_OK);
+  CHECK(same_contacts(queries.contacts, here));
+  CHECK_STATUS(tandem_gpu_manifolds_create(NULL, &refused), TANDEM_OK);
+  CHECK_STATUS(tandem_gpu_manifolds_set_assets(refused, precise, stream), TANDEM_NOT_FLOAT32);
+  tandem_gpu_manifolds_destroy(refused);
+  tandem_gpu_contact_query_destroy(queries.contacts);
+  tandem_gpu_broad_phase_destroy(queries.near);
+  cuda_must(cudaFree((void*)places));
+  cuda_must(cudaFree(numbers));
+  tandem_scene_destroy(here);
+  free_mesh(&cow);
+  free_gpu_scene(&there);
+  tandem_gpu_assets_release(single);
+  tandem_gpu_assets_release(precise);
+}
+
 int main(int argc, char** argv) {
   if (argc != 2) return printf("usage: gpu_deform_test ASSETS_FOLDER\n"), 1;
   if (!has_gpu()) return printf("there is no GPU\n"), NO_GPU;
   begin(argv[1]);
   test_deforming(argv[1]);
+  test_float64(argv[1]);
   end();
   return failures != 0;
 }

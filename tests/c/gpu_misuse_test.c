@@ -44,13 +44,13 @@ static void test_deforming(void) {
   tandem_gpu_deform_report report = {TANDEM_INTERNAL_ERROR, 7, 7};
   uint64_t where = 7;
   const uint32_t first = 0;
-  CHECK_STATUS(tandem_gpu_assets_create_deforming(NULL, &first, 1, NULL, NULL, NULL, NULL),
+  CHECK_STATUS(tandem_gpu_assets_create_deforming(NULL, &first, 1, 0, NULL, NULL, NULL, NULL),
                TANDEM_NULL_ARGUMENT);
-  CHECK_STATUS(tandem_gpu_assets_create_deforming(NULL, &first, 1, NULL, NULL, &made, &where),
+  CHECK_STATUS(tandem_gpu_assets_create_deforming(NULL, &first, 1, 0, NULL, NULL, &made, &where),
                TANDEM_NULL_ARGUMENT);
   CHECK(made == NULL && where == 0 && tandem_gpu_assets_deforming_count(NULL) == 0);
-  CHECK_STATUS(tandem_gpu_assets_enqueue_deform(NULL, NULL, NULL), TANDEM_NULL_ARGUMENT);
-  CHECK_STATUS(tandem_gpu_assets_deform(NULL, NULL, NULL), TANDEM_NULL_ARGUMENT);
+  CHECK_STATUS(tandem_gpu_assets_enqueue_deform(NULL, NULL, NULL, NULL), TANDEM_NULL_ARGUMENT);
+  CHECK_STATUS(tandem_gpu_assets_deform(NULL, NULL, NULL, NULL), TANDEM_NULL_ARGUMENT);
   CHECK_STATUS(tandem_gpu_assets_get_report(NULL, &report), TANDEM_NULL_ARGUMENT);
   CHECK(report.status == TANDEM_OK && report.body == 0 && report.where == 0);
   CHECK(tandem_gpu_assets_device_report(NULL) == NULL);

@@ -59,7 +59,7 @@ struct Step {
   GpuBroadPhase broad_phase;
   GpuContactQuery query;
 
-  void prepare(std::span<const GpuAsset> assets, const GpuAsset* records) {
+  void prepare(std::span<const GpuAsset> assets, const GpuAssetRecords& records) {
     expect(query.set_assets(assets, nullptr), "assets");
     expect(query.follow(records), "follow");
     expect(broad_phase.find_pairs(instances, bounds, {}, nullptr), "broad phase");
@@ -115,20 +115,22 @@ int run(const char* path, std::uint32_t bodies, double spacing) {
 
   GpuAssetList list, rigid_list;
   GpuDeformer deformer;
-  expect(list.set(assets, nullptr), "list");
-  expect(rigid_list.set(assets, nullptr), "list");
+  expect(list.set(assets, PositionTypes::float32, nullptr), "list");
+  expect(rigid_list.set(assets, PositionTypes::float32, nullptr), "list");
   expect(deformer.begin(assets, numbers, list.records(), nullptr), "deformer");
-  expect(deformer.deform(places_on_gpu.data(), nullptr), "deform");
+  expect(deformer.deform({.in_float32 = places_on_gpu.data()}, nullptr), "deform");
   const GpuInstances instances = {asset.data(), pose.data(), bodies};
   Step bent = {instances, list.records().bounds_of_all(), {}, {}};
   Step rigid = {instances, rigid_list.records().bounds_of_all(), {}, {}};
-  bent.prepare(assets, list.records().assets);
-  rigid.prepare(assets, nullptr);
+  bent.prepare(assets, list.records());
+  rigid.prepare(assets, {});
 
   GpuStream stream;
   expect(stream.create(), "stream");
   expect(cudaDeviceSynchronize(), "wait");
-  const auto refit = [&](cudaStream_t on) { return deformer.enqueue(places_on_gpu.data(), on); };
+  const auto refit = [&](cudaStream_t on) {
+    return deformer.enqueue({.in_float32 = places_on_gpu.data()}, on);
+  };
   std::printf("%u bodies of %u triangles, %u blocks, %zu vertices; %.2f GB of trees\n", bodies,
               view.level().triangle_count, view.level().block_count, rest.size() / 3,
               1e-9 * static_cast<double>(deformer.bytes()));

@@ -53,6 +53,27 @@ def test_deformed_assets_have_the_contacts_of_the_cpu(assets, library):
 
 
 @needs_gpu
+def test_positions_in_float64_count_as_they_are(assets, library):
+    asset, pose = make_scene()
+    query, on = cuda.Query(assets, deforming=[0, 1], float64=True), (library.put(asset), library.put(pose))
+    for step in (1, 2):
+        shapes = waving(assets, step)
+        shapes[1] = shapes[1].astype(np.float64) / 3 * 3.1  # no float32 numbers, beside a box in float32
+        query.deform({number: library.put(numbers) for number, numbers in shapes.items()})
+        found = query.contacts(asset=on[0], pose=on[1], sorted=True)
+        scene = deformed_on_cpu(assets, shapes, cpu_instances(asset, pose))
+        expected = scene.contacts().contacts
+        assert len(expected) > 0 and np.array_equal(found.contacts.numpy(), sorted_contacts(expected))
+        x, y = query.distances(asset=on[0], pose=on[1]).distances.numpy(), scene.distances().distances
+        assert (x["lower"] <= y["upper"]).all() and (y["lower"] <= x["upper"]).all()
+    for ask in (query.manifolds, query.contained):
+        query.contacts(asset=on[0], pose=on[1], sorted=True, grouped=True)
+        with pytest.raises(tandem.Error) as caught:
+            ask()
+        assert caught.value.name == "NotFloat32"
+
+
+@needs_gpu
 def test_positions_are_read_where_they_are_and_by_the_array_interface(torch, assets):
     asset, pose = make_scene()
     on = torch.from_numpy(asset).cuda(), torch.from_numpy(pose).cuda()

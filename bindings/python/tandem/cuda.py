@@ -316,6 +316,7 @@ class Query:
         contents: "all"; "exact": what `contacts` in mode "exact" and `verdicts` take, a third less; "manifolds": these and what manifolds and contained bodies take.
         deforming: the assets, by their places in the list, that `deform` gives other shapes; list an asset twice where one of its bodies bends alone. Their files
             need source vertices, and `contents` is not "exact". Each takes 48 bytes a triangle and 240 a block more, and `verdicts` is not offered.
+        float64: whether their positions may be in float64, too, which takes 72 bytes a triangle more; `manifolds`, `contained` and `impacts` are not offered then.
 
     Calls take the instances as `Query.instances` made them, or as two arrays:
 
@@ -333,10 +334,10 @@ class Query:
     __slots__ = ("_assets", "_core", "_deforming", "_given", "_positions", "_probe_step", "_step", "__weakref__")
 
     def __init__(self, assets: Iterable[Asset], *, device: int = 0, contents: Literal["all", "exact", "manifolds"] = "all", deforming: Iterable[int] = (),
-                 stream: Any = None):
+                 float64: bool = False, stream: Any = None):
         cores = cores_of(assets)
         self._deforming = sorted({whole_number(asset, "deforming", 0, len(cores) - 1) for asset in deforming})
-        self._assets = _cuda.Assets(cores, device, _choice("contents", contents, _CONTENTS), self._deforming, _stream(stream))
+        self._assets = _cuda.Assets(cores, device, _choice("contents", contents, _CONTENTS), self._deforming, bool(float64), _stream(stream))
         self._positions: _cuda.Positions | None = None  # those that were queued last
         self._core = _cuda.Query(self._assets)
         self._given: Any = None  # the pairs of the last contacts()
@@ -357,8 +358,8 @@ class Query:
         """Looks at arrays of positions once for many calls, which read them anew.
 
         Args:
-            positions: by asset, of some of those that deform: (n, 3) float32, a row for each vertex of the mesh that the asset was built from
-                (`Asset.source_vertices`), in its coordinates.
+            positions: by asset, of some of those that deform: (n, 3) float32, or float64 if the query takes it, a row for each vertex of the mesh that the asset was
+                built from (`Asset.source_vertices`), in its coordinates.
         """
         if not isinstance(positions, Mapping):
             raise TypeError(f"positions is {type(positions).__name__} where a dict of arrays by asset is wanted")

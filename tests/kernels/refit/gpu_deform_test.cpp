@@ -7,10 +7,17 @@
 #include "bent_mesh.h"
 #include "gpu/gpu_scene_fixture.h"
 #include "gpu/made_files.h"
+#include "kernels/geometry/relative_pose.h"
 #include "kernels/refit/deformed_tree.h"
 #include "tandem/kernels/gpu_broad_phase.h"
+#include "tandem/kernels/gpu_closest_query.h"
+#include "tandem/kernels/gpu_containment_query.h"
 #include "tandem/kernels/gpu_deformer.h"
+#include "tandem/kernels/gpu_distance_query.h"
+#include "tandem/kernels/gpu_impact_query.h"
+#include "tandem/kernels/gpu_manifold_query.h"
 #include "tandem/kernels/gpu_moved_query.h"
+#include "tandem/kernels/gpu_ray_query.h"
 #include "tandem/kernels/gpu_tolerance_query.h"
 
 namespace tandem::test {
@@ -32,32 +39,53 @@ struct DeformingAssets {
   GpuAssetList list;
   std::vector<std::uint32_t> bodies;
   GpuDeformer deformer;
-  std::vector<GpuArray<float>> positions;  // of each body
+  std::vector<GpuArray<float>> in_float32;  // of each body
+  std::vector<GpuArray<double>> in_float64;
   GpuArray<const float*> places;
+  GpuArray<const double*> places_in_float64;
 
-  DeformingAssets(const Files& files, std::vector<std::uint32_t> deforming, Contents contents = Contents::all)
-      : views(views_of(files)), bodies(std::move(deforming)), positions(bodies.size()) {
+  DeformingAssets(const Files& files, std::vector<std::uint32_t> deforming, Contents contents = Contents::all,
+                  PositionTypes types = PositionTypes::float32)
+      : views(views_of(files)),
+        bodies(std::move(deforming)),
+        in_float32(bodies.size()),
+        in_float64(bodies.size()) {
     EXPECT_EQ(uploaded.upload(views, contents, nullptr), Status::kOk);
     for (std::size_t i = 0; i < views.size(); ++i) assets.push_back(gpu_asset(uploaded.level(i), views[i]));
-    EXPECT_EQ(list.set(assets, nullptr), Status::kOk);
+    EXPECT_EQ(list.set(assets, types, nullptr), Status::kOk);
     EXPECT_EQ(deformer.begin(assets, bodies, list.records(), nullptr), Status::kOk)
         << cudaGetErrorString(deformer.cuda_error());
   }
 
   /// An empty list: the body stays as it is.
-  void upload(const std::vector<std::vector<float>>& now) {
-    std::vector<const float*> place;
-    for (std::size_t i = 0; i < bodies.size(); ++i) {
-      EXPECT_EQ(positions[i].upload(now[i], nullptr), cudaSuccess);
-      place.push_back(now[i].empty() ? nullptr : positions[i].data());
-    }
-    EXPECT_EQ(places.upload(place, nullptr), cudaSuccess);
-    EXPECT_EQ(cudaStreamSynchronize(nullptr), cudaSuccess);
-  }
+  void upload(const std::vector<std::vector<float>>& now) { upload(now, in_float32, places); }
 
   Status deform(const std::vector<std::vector<float>>& now) {
     upload(now);
-    return deformer.deform(places.data(), nullptr);
+    return deformer.deform({.in_float32 = places.data()}, nullptr);
+  }
+  Status deform(const std::vector<std::vector<double>>& now) {
+    upload(now, in_float64, places_in_float64);
+    return deformer.deform({.in_float64 = places_in_float64.data()}, nullptr);
+  }
+  Status deform(const std::vector<std::vector<float>>& single,
+                const std::vector<std::vector<double>>& precise) {
+    upload(single);
+    upload(precise, in_float64, places_in_float64);
+    return deformer.deform({places.data(), places_in_float64.data()}, nullptr);
+  }
+
+ private:
+  template <typename Real>
+  void upload(const std::vector<std::vector<Real>>& now, std::vector<GpuArray<Real>>& arrays,
+              GpuArray<const Real*>& to) {
+    std::vector<const Real*> place;
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+      EXPECT_EQ(arrays[i].upload(now[i], nullptr), cudaSuccess);
+      place.push_back(now[i].empty() ? nullptr : arrays[i].data());
+    }
+    EXPECT_EQ(to.upload(place, nullptr), cudaSuccess);
+    EXPECT_EQ(cudaStreamSynchronize(nullptr), cudaSuccess);
   }
 };
 
@@ -83,12 +111,13 @@ std::vector<OrientedBlock> deformed_oriented(const LevelView& rest, const LevelV
 }
 
 /// What lies on the GPU is what the CPU makes of the same positions.
-void expect_same_tree(const DeformingAssets& of, std::uint32_t body, const std::vector<float>& now) {
+template <typename Real>
+void expect_same_tree(const DeformingAssets& of, std::uint32_t body, const std::vector<Real>& now) {
   const std::uint32_t number = of.bodies[body];
   const LevelView rest = of.views[number].level(), level = of.deformer.level(body);
   DeformedTree tree;
   ASSERT_EQ(tree.begin(rest), Status::kOk);
-  ASSERT_EQ(tree.refit(now), Status::kOk);
+  ASSERT_EQ(tree.refit(std::span<const Real>(now)), Status::kOk);
   expect_same_elements(level.triangles, tree.level().triangles, rest.triangle_count, "triangle");
   if (level.blocks != nullptr)
     expect_same_elements(level.blocks, tree.level().blocks, rest.block_count, "block");
@@ -97,9 +126,10 @@ void expect_same_tree(const DeformingAssets& of, std::uint32_t body, const std::
                          rest.block_count, "oriented block");
   const GpuAsset record = download(of.list.records().assets + number, 1)[0];
   const AssetBounds bounds = download(of.list.records().bounds + number, 1)[0];
-  const TreeExtent extent = extent_of(tree.level().blocks[0]);
+  TreeExtent extent = extent_of(tree.level().blocks[0]);
+  widen_for_rounding(tree.rounding(), extent);
   float lower[3], upper[3];
-  ASSERT_EQ(check_positions(now, lower, upper), now.size() / 3);
+  ASSERT_EQ(check_positions(std::span<const Real>(now), lower, upper), now.size() / 3);
   for (int k = 0; k < 3; ++k) {
     EXPECT_TRUE(record.lower[k] == lower[k] && record.upper[k] == upper[k]);
     EXPECT_TRUE(bounds.lower[k] == lower[k] && bounds.upper[k] == upper[k]);
@@ -112,6 +142,10 @@ void expect_same_tree(const DeformingAssets& of, std::uint32_t body, const std::
   EXPECT_EQ(record.tree.blocks, level.blocks);
   EXPECT_EQ(record.tree.oriented_blocks, level.oriented_blocks);
   EXPECT_EQ(record.tree.topology, of.assets[number].tree.topology);
+  ASSERT_EQ(record.tree.precise, tree.level().precise != nullptr ? level.precise : nullptr);
+  if (record.tree.precise != nullptr)
+    expect_same_elements(level.precise, tree.level().precise, rest.triangle_count,
+                         "float64 corners of triangle");
 }
 
 Files refittable(const std::vector<Mesh>& meshes) {
@@ -174,6 +208,71 @@ TEST_F(GpuDeformerTest, WritesTheBytesOfTheCpuForAnyFiniteCoordinates) {
   }
 }
 
+// Bodies change between float32, float64 and numbers that fit both.
+TEST_F(GpuDeformerTest, WritesTheBytesOfTheCpuForPositionsInFloat64) {
+  const std::vector<Mesh> meshes = small_and_large_meshes();
+  DeformingAssets of(refittable(meshes), {0, 1, 3, 4, 5, 6, 7}, Contents::all,
+                     PositionTypes::float32_and_float64);
+  RandomPoses random(26);
+  const std::size_t count = of.bodies.size();
+  std::vector<std::vector<float>> last_single(count);
+  std::vector<std::vector<double>> last_precise(count);
+  for (int step = 0; step < trials(12, 20); ++step) {
+    std::vector<std::vector<float>> single_now(count);
+    std::vector<std::vector<double>> precise_now(count);
+    for (std::size_t i = 0; i < count; ++i) {
+      const Bend bend = kBends[random.below(std::size(kBends))];
+      const Positions now = bent(bend, random.symmetric(4), positions_of(meshes[of.bodies[i]]), random);
+      const std::vector<float> rounded = single(now);
+      switch (random.below(step > 0 ? 4 : 3)) {
+        case 0:
+          last_single[i] = single_now[i] = rounded, last_precise[i].clear();
+          break;
+        case 1:
+          last_precise[i] = precise_now[i] = flat(now), last_single[i].clear();
+          break;
+        case 2:
+          precise_now[i].assign(rounded.begin(), rounded.end());
+          last_precise[i] = precise_now[i], last_single[i].clear();
+          break;
+        default:
+          break;
+      }
+    }
+    ASSERT_EQ(of.deform(single_now, precise_now), Status::kOk)
+        << cudaGetErrorString(of.deformer.cuda_error());
+    for (std::uint32_t i = 0; i < count; ++i) {
+      SCOPED_TRACE(testing::Message() << "step " << step << ", body " << i);
+      if (last_precise[i].empty())
+        expect_same_tree(of, i, last_single[i]);
+      else
+        expect_same_tree(of, i, last_precise[i]);
+    }
+  }
+}
+
+// Coordinates of any bits that are in range, so that they are rounded in every way there is.
+TEST_F(GpuDeformerTest, WritesTheBytesOfTheCpuForAnyFloat64Coordinates) {
+  const Mesh mesh = random_mesh(500, 4);
+  DeformingAssets of(refittable({mesh}), {0}, Contents::all, PositionTypes::float32_and_float64);
+  RandomPoses random(27);
+  std::vector<double> now(3 * mesh.points.size());
+  for (int step = 0; step < trials(30, 30); ++step) {
+    for (double& x : now) {
+      do {
+        const std::uint64_t bits = random.engine()();
+        std::memcpy(&x, &bits, sizeof x);
+        if (step % 3 == 0)
+          x = std::ldexp(1 + static_cast<double>(bits % 8) * 0x1p-26, static_cast<int>(bits >> 8 & 31));
+        if (step % 3 == 1)  // near the smallest numbers of float32
+          x = std::ldexp(static_cast<double>(bits % 1000) - 500, -150 - static_cast<int>(bits >> 20 & 7));
+      } while (!(std::fabs(x) <= static_cast<double>(kMaxCoordinate)));
+    }
+    ASSERT_EQ(of.deform(std::vector<std::vector<double>>{now}), Status::kOk);
+    expect_same_tree(of, 0, now);
+  }
+}
+
 TEST_F(GpuDeformerTest, TakesTreesWithBlocksOfOneKind) {
   const Mesh mesh = welded(cube(0.5f, 12));
   const MadeLevel level = built_level(mesh);
@@ -220,6 +319,25 @@ TEST_F(GpuDeformerTest, BodiesWithBadPositionsStayAsTheyAreAndTheFirstIsNamed) {
   expect_same_tree(of, 3, bad[3]);
 }
 
+TEST_F(GpuDeformerTest, BadPositionsInFloat64AreNamedBesideOthers) {
+  const Mesh mesh = welded(cube(0.5f, 24));
+  DeformingAssets of(refittable({mesh, mesh, mesh}), {0, 1, 2}, Contents::all,
+                     PositionTypes::float32_and_float64);
+  RandomPoses random(28);
+  const Positions twisted = bent(Bend::twist, 1, positions_of(mesh), random),
+                  waving = bent(Bend::wave, 1, positions_of(mesh), random);
+  ASSERT_EQ(of.deform({single(twisted), single(twisted), {}}, {{}, {}, flat(twisted)}), Status::kOk);
+  std::vector<double> bad = flat(waving);
+  bad[3 * 2400 + 2] = std::nextafter(static_cast<double>(kMaxCoordinate), INFINITY);
+  bad[3 * 2401] = NAN;
+  EXPECT_EQ(of.deform({single(waving), {}, {}}, {{}, flat(waving), bad}), Status::kOutOfRange);
+  EXPECT_EQ(of.deformer.report().body, 2u);
+  EXPECT_EQ(of.deformer.report().where, 2400u);
+  expect_same_tree(of, 0, single(waving));
+  expect_same_tree(of, 1, flat(waving));
+  expect_same_tree(of, 2, flat(twisted));
+}
+
 TEST_F(GpuDeformerTest, WhatCannotDeformIsNamed) {
   const Mesh mesh = cube(0.5f, 1);
   Files files = refittable({mesh});
@@ -231,7 +349,7 @@ TEST_F(GpuDeformerTest, WhatCannotDeformIsNamed) {
   const GpuAsset assets[] = {gpu_asset(uploaded.level(0), views[0]), gpu_asset(uploaded.level(1), views[1])};
   const GpuAsset few[] = {gpu_asset(without.level(0), views[0])};
   GpuAssetList list;
-  ASSERT_EQ(list.set(assets, nullptr), Status::kOk);
+  ASSERT_EQ(list.set(assets, PositionTypes::float32, nullptr), Status::kOk);
   GpuDeformer deformer;
   const auto begin = [&](std::span<const GpuAsset> of, std::uint32_t body) {
     return deformer.begin(of, std::span(&body, 1), list.records(), nullptr);
@@ -240,16 +358,39 @@ TEST_F(GpuDeformerTest, WhatCannotDeformIsNamed) {
   EXPECT_EQ(begin(assets, 1), Status::kNoSourceVertices);
   EXPECT_EQ(begin(few, 0), Status::kNoSourceVertices);
   EXPECT_EQ(deformer.bodies(), 0u);
-  EXPECT_EQ(deformer.deform(nullptr, nullptr), Status::kOk);
+  EXPECT_EQ(deformer.deform({}, nullptr), Status::kOk);
   EXPECT_EQ(begin(assets, 0), Status::kOk);
   EXPECT_EQ(deformer.bodies(), 1u);
   GpuToleranceQuery verdicts;
   GpuMovedQuery moved;
   ASSERT_EQ(verdicts.set_assets(std::span(assets).first(1), nullptr), Status::kOk);
   ASSERT_EQ(moved.set_assets(std::span(assets).first(1), nullptr), Status::kOk);
-  EXPECT_EQ(verdicts.follow(list.records().assets), Status::kDeformed);
-  EXPECT_EQ(moved.follow(list.records().assets), Status::kDeformed);
-  EXPECT_EQ(moved.follow(nullptr), Status::kOk);
+  EXPECT_EQ(verdicts.follow(list.records()), Status::kDeformed);
+  EXPECT_EQ(moved.follow(list.records()), Status::kDeformed);
+  EXPECT_EQ(moved.follow({}), Status::kOk);
+}
+
+TEST_F(GpuDeformerTest, QuestionsThatTakeNoFloat64SayWhichAssetsMayHaveIt) {
+  const Files files = refittable({cube(0.5f, 1)});
+  DeformingAssets single(files, {0}), precise(files, {0}, Contents::all, PositionTypes::float32_and_float64);
+  const auto follow = [&](auto query, const DeformingAssets& of) {
+    EXPECT_EQ(query.set_assets(of.assets, nullptr), Status::kOk);
+    return query.follow(of.list.records());
+  };
+  for (const DeformingAssets* of : {&single, &precise}) {
+    const Status refused = of == &single ? Status::kOk : Status::kNotFloat32;
+    EXPECT_EQ(follow(GpuManifoldQuery(), *of), refused);
+    EXPECT_EQ(follow(GpuContainmentQuery(), *of), refused);
+    EXPECT_EQ(follow(GpuImpactQuery(), *of), refused);
+    EXPECT_EQ(follow(GpuContactQuery(), *of), Status::kOk);
+    EXPECT_EQ(follow(GpuDistanceQuery(), *of), Status::kOk);
+    EXPECT_EQ(follow(GpuClosestQuery(), *of), Status::kOk);
+    EXPECT_EQ(follow(GpuRayQuery(), *of), Status::kOk);
+  }
+  const std::vector<double> now(3 * single.assets[0].source_vertices, 1.0 / 3);
+  const std::vector<std::vector<double>> of_all = {now};
+  EXPECT_EQ(single.deform(of_all), Status::kNotFloat32);
+  EXPECT_EQ(precise.deform(of_all), Status::kOk);
 }
 
 /// Bodies near each other, each an asset of its own.
@@ -300,13 +441,13 @@ TEST_F(GpuDeformerTest, AGraphIsReplayedWithNewPositionsInPlace) {
   GpuBroadPhase broad_phase;
   GpuContactQuery query;
   ASSERT_EQ(query.set_assets(of.assets, nullptr), Status::kOk);
-  ASSERT_EQ(query.follow(of.list.records().assets), Status::kOk);
+  ASSERT_EQ(query.follow(of.list.records()), Status::kOk);
   const GpuBroadPhaseOptions sorted_pairs = {.sorted = true};
   ASSERT_EQ(broad_phase.reserve({placed.count, 100, placed.count}, sorted_pairs), Status::kOk);
   ASSERT_EQ(query.reserve({100, 100000, 100000}), Status::kOk);
   GraphStream graph;
   graph.capture([&] {
-    Status status = of.deformer.enqueue(of.places.data(), graph.get());
+    Status status = of.deformer.enqueue({.in_float32 = of.places.data()}, graph.get());
     if (status == Status::kOk)
       status = broad_phase.enqueue(placed, of.list.records().bounds_of_all(), sorted_pairs, graph.get());
     return status == Status::kOk

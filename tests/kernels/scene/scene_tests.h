@@ -92,6 +92,16 @@ void expect_same_bytes(std::span<const Row> here, std::span<const Row> there) {
   EXPECT_TRUE(here.empty() || std::memcmp(here.data(), there.data(), here.size_bytes()) == 0);
 }
 
+/// Expects that intervals meet, and that the same pairs touch.
+inline void expect_same_distances(const DistanceQuery& here, const DistanceQuery& there) {
+  ASSERT_EQ(here.rows().size(), there.rows().size());
+  for (std::size_t i = 0; i < here.rows().size(); ++i) {
+    const ObjectDistance &x = here.rows()[i], &y = there.rows()[i];
+    EXPECT_TRUE(x.lower <= y.upper && y.lower <= x.upper) << i;
+    EXPECT_EQ(x.upper == 0, y.upper == 0) << i;
+  }
+}
+
 /// Expects the same of all questions but distances and impacts, which are only as certified: their intervals
 /// meet, and they tell the same pairs apart from those that touch.
 inline void expect_same_answers(const Questions& here, const Questions& there) {
@@ -105,12 +115,7 @@ inline void expect_same_answers(const Questions& here, const Questions& there) {
   EXPECT_TRUE(std::ranges::equal(here.contained.rows(), there.contained.rows()));
   EXPECT_EQ(here.contained.counters(), there.contained.counters());
   EXPECT_TRUE(std::ranges::equal(here.verdicts.rows(), there.verdicts.rows()));
-  ASSERT_EQ(here.distances.rows().size(), there.distances.rows().size());
-  for (std::size_t i = 0; i < here.distances.rows().size(); ++i) {
-    const ObjectDistance &x = here.distances.rows()[i], &y = there.distances.rows()[i];
-    EXPECT_TRUE(x.lower <= y.upper && y.lower <= x.upper) << i;
-    EXPECT_EQ(x.upper == 0, y.upper == 0) << i;
-  }
+  expect_same_distances(here.distances, there.distances);
   ASSERT_EQ(here.impacts.rows().size(), there.impacts.rows().size());
   for (std::size_t i = 0; i < here.impacts.rows().size(); ++i) {
     const Impact &x = here.impacts.rows()[i], &y = there.impacts.rows()[i];
@@ -495,6 +500,31 @@ TYPED_TEST_P(SceneOn, AnswersQuestionsAboutBodiesThatBend) {
   EXPECT_GT(contained, 0u);
 }
 
+/// Expects the same contacts and clearances of two scenes, asked in every way, and distances that agree.
+/// Returns how many contacts there are.
+inline std::size_t expect_same_meetings(Scene& scene, Scene& on_cpu, double within) {
+  ContactQuery here, there;
+  std::size_t contacts = 0;
+  ContactOptions asked[6];
+  asked[1].self_pairs = true;
+  asked[2].mode = QueryMode::fast;
+  asked[3].mode = QueryMode::boxes;
+  asked[4].within = within;
+  asked[5].self_pairs = true, asked[5].leave_out_rings = 1;
+  for (const ContactOptions& options : asked) {
+    EXPECT_EQ(here.find(scene, options), Status::kOk);
+    EXPECT_EQ(there.find(on_cpu, options), Status::kOk);
+    EXPECT_TRUE(std::ranges::equal(here.pairs(), there.pairs()));
+    EXPECT_EQ(sorted(here), sorted(there));
+    contacts += here.rows().size();
+  }
+  DistanceQuery near, far;
+  EXPECT_EQ(near.find(scene, {.reach = 1}), Status::kOk);
+  EXPECT_EQ(far.find(on_cpu, {.reach = 1}), Status::kOk);
+  expect_same_distances(near, far);
+  return contacts;
+}
+
 /// Wild shapes, among them flat ones, points, and coordinates of 1e15: contacts are asked for in every way.
 TYPED_TEST_P(SceneOn, FindsContactsOfBodiesThatBendWildly) {
   RandomPoses random(32);
@@ -505,7 +535,6 @@ TYPED_TEST_P(SceneOn, FindsContactsOfBodiesThatBendWildly) {
   ASSERT_EQ(on_cpu.set_assets(bodies.views), Status::kOk);
   ASSERT_EQ(scene.place(bodies.instances), Status::kOk);
   ASSERT_EQ(on_cpu.place(bodies.instances), Status::kOk);
-  ContactQuery here, there;
   std::size_t contacts = 0;
   for (int step = 0; step < 12; ++step) {
     SCOPED_TRACE(testing::Message() << "step " << step);
@@ -514,23 +543,93 @@ TYPED_TEST_P(SceneOn, FindsContactsOfBodiesThatBendWildly) {
       ASSERT_EQ(scene.deform(asset, now), Status::kOk);
       ASSERT_EQ(on_cpu.deform(asset, now), Status::kOk);
     }
-    ContactOptions asked[5];
-    asked[1].self_pairs = true;
-    asked[2].mode = QueryMode::fast;
-    asked[3].mode = QueryMode::boxes;
-    asked[4].within = 0.25;
-    for (const ContactOptions& options : asked) {
-      ASSERT_EQ(here.find(scene, options), Status::kOk);
-      ASSERT_EQ(there.find(on_cpu, options), Status::kOk);
-      EXPECT_TRUE(std::ranges::equal(here.pairs(), there.pairs()));
-      EXPECT_EQ(sorted(here), sorted(there));
-      contacts += here.rows().size();
-    }
+    contacts += expect_same_meetings(scene, on_cpu, 0.25);
   }
   EXPECT_GT(contacts, 10000u);
 }
 
-/// A scene on a GPU takes float64 numbers where float32 has them.
+/// Some bodies bend by float64 positions and some by float32, and some are rigid. Questions that are not
+/// offered for float64 name an asset.
+TYPED_TEST_P(SceneOn, DecidesOnPositionsInFloat64) {
+  RandomPoses random(34);
+  const BendingBodies bodies(random);
+  TypeParam scene;
+  Scene on_cpu;
+  const auto in_both = [&](const auto& change) {
+    ASSERT_EQ(change(scene), Status::kOk);
+    ASSERT_EQ(change(on_cpu), Status::kOk);
+  };
+  in_both([&](Scene& of) { return of.set_assets(bodies.views); });
+  in_both([&](Scene& of) { return of.place(bodies.instances); });
+  std::size_t contacts = 0;
+  for (int step = 0; step < 10; ++step) {
+    SCOPED_TRACE(testing::Message() << "step " << step);
+    for (std::uint32_t asset = 0; asset < 4; ++asset) {
+      const test::Bend bend = test::kBends[random.below(std::size(test::kBends))];
+      const test::Positions now =
+          test::bent(bend, random.symmetric(2), test::positions_of(bodies.meshes[asset]), random);
+      if ((static_cast<std::uint32_t>(step) + asset) % 4 == 0)
+        in_both([&](Scene& of) { return of.deform(asset, test::single(now)); });
+      else
+        in_both([&](Scene& of) { return of.deform(asset, test::flat(now)); });
+    }
+    contacts += expect_same_meetings(scene, on_cpu, 0.25);
+  }
+  EXPECT_GT(contacts, 10000u);
+  std::vector<double> thirds(3 * bodies.views[1].header->source_vertices, 1.0 / 3);
+  in_both([&](Scene& of) { return of.deform(1, thirds); });
+  for (const std::uint32_t asset : {0u, 2u, 3u})
+    in_both(
+        [&](Scene& of) { return of.deform(asset, test::single(test::positions_of(bodies.meshes[asset]))); });
+  Questions questions;
+  std::vector<RigidMotion> motion(bodies.instances.size());
+  const auto expect_refused = [&](Status status) {
+    EXPECT_EQ(status, Status::kNotFloat32);
+    EXPECT_EQ(scene.where(), 1u);
+  };
+  ASSERT_EQ(questions.contacts.find(scene, {}), Status::kOk);
+  expect_refused(questions.manifolds.find(scene, questions.contacts, {}));
+  expect_refused(questions.contained.find(scene, questions.contacts));
+  expect_refused(questions.impacts.find(scene, {.motion = motion, .duration = 0.2}));
+  thirds[7] = NAN;
+  EXPECT_EQ(scene.deform(1, thirds), Status::kOutOfRange);
+  EXPECT_EQ(scene.where(), 2u);
+  // They are offered again where all positions are float32 numbers.
+  std::fill(thirds.begin(), thirds.end(), 0.25);
+  in_both([&](Scene& of) { return of.deform(1, thirds); });
+  questions.of_verdicts = Status::kDeformed;
+  questions.ask(scene, 0.5, false, false);
+}
+
+/// Two sheets are nearer to each other than float32 can tell.
+TYPED_TEST_P(SceneOn, TellsGapsApartThatFloat32Lacks) {
+  RandomPoses random(35);
+  const BendingBodies bodies(random);
+  const AssetView views[] = {bodies.views[0], bodies.views[0]};
+  const Instance instances[] = {{0, kIdentityPose}, {1, kIdentityPose}};
+  TypeParam scene;
+  ASSERT_EQ(scene.set_assets(views), Status::kOk);
+  ASSERT_EQ(scene.place(instances), Status::kOk);
+  for (const double gap : {0.0, 0x1p-54, 1e-13, 1e-9}) {
+    test::Positions sheet = test::positions_of(bodies.meshes[0]);
+    for (auto& p : sheet) p = {p[0] / 3, p[1] / 3, 1.0 / 3};
+    ASSERT_EQ(scene.deform(0, test::flat(sheet)), Status::kOk);
+    for (auto& p : sheet) p[2] += gap;
+    ASSERT_EQ(scene.deform(1, test::flat(sheet)), Status::kOk);
+    ContactQuery contacts, within, beyond;
+    DistanceQuery distances;
+    ASSERT_EQ(contacts.find(scene, {}), Status::kOk);
+    ASSERT_EQ(within.find(scene, {.within = 1.5 * gap}), Status::kOk);
+    ASSERT_EQ(beyond.find(scene, {.within = 0.5 * gap}), Status::kOk);
+    ASSERT_EQ(distances.find(scene, {.tolerance = {0, 1e-6}, .reach = 1}), Status::kOk);
+    EXPECT_EQ(contacts.rows().empty(), gap > 0) << gap;
+    EXPECT_FALSE(within.rows().empty()) << gap;
+    EXPECT_EQ(beyond.rows().empty(), gap > 0) << gap;
+    ASSERT_EQ(distances.rows().size(), 1u);
+    EXPECT_NEAR(distances.rows()[0].upper, (1.0 / 3 + gap) - 1.0 / 3, 1e-5 * gap);
+  }
+}
+
 TYPED_TEST_P(SceneOn, RefusesPositionsAndStaysAsItIs) {
   RandomPoses random(33);
   const BendingBodies bodies(random);
@@ -551,11 +650,6 @@ TYPED_TEST_P(SceneOn, RefusesPositionsAndStaysAsItIs) {
   EXPECT_EQ(scene.where(), 3u);
   EXPECT_EQ(scene.deform(7, single), Status::kUnknownAsset);
   EXPECT_EQ(scene.deform(2, single), Status::kVertexCountMismatch);
-  if (!std::is_same_v<TypeParam, Scene>) {
-    positions[10] = 1.0 / 3;
-    EXPECT_EQ(scene.deform(1, positions), Status::kNotFloat32);
-    EXPECT_EQ(scene.where(), 3u);
-  }
   here.of_verdicts = there.of_verdicts = Status::kDeformed;
   here.ask(scene, 0.5, false, true);
   there.ask(on_cpu, 0.5, false, true);
@@ -575,6 +669,7 @@ REGISTER_TYPED_TEST_SUITE_P(SceneOn, FindsThePairsOfItsBodiesWhateverChanged, Fi
                             FindsThePairsOfBodiesThatHardlyMove, RefusesListsOfDifferentLengths,
                             AnswersManyQuestionsAboutTheSameBodies, AnswersOfNoBodiesAreEmpty,
                             AnswersQuestionsAboutBodiesThatBend, FindsContactsOfBodiesThatBendWildly,
+                            DecidesOnPositionsInFloat64, TellsGapsApartThatFloat32Lacks,
                             RefusesPositionsAndStaysAsItIs);
 
 }  // namespace tandem

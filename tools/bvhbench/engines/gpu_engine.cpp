@@ -114,14 +114,15 @@ std::span<const float> GpuEngine::checked(const BentShape& bent) const {
 // Gives all shapes records, as the file has them, which the query follows from then on, and names those that
 // deform. Condition: their positions and places are on the GPU.
 void GpuEngine::begin_deforming() {
-  check(list_.set(shapes_, stream()), cudaSuccess, "deformed shapes");
+  check(list_.set(shapes_, PositionTypes::float32, stream()), cudaSuccess, "deformed shapes");
   std::vector<std::uint32_t> numbers;
   for (const auto& [shape, positions] : deforming_.positions) numbers.push_back(shape);
   GpuDeformer& deformer = deforming_.deformer;
   check(deformer.begin(shapes_, numbers, list_.records(), stream()), deformer.cuda_error(),
         "deformed shapes");
   deforming_.refit = captured([this, &deformer] {
-    check(deformer.enqueue(deforming_.places.on_gpu.data(), stream()), deformer.cuda_error(), "refit");
+    check(deformer.enqueue({.in_float32 = deforming_.places.on_gpu.data()}, stream()), deformer.cuda_error(),
+          "refit");
   });
   name_shapes();
 }

@@ -66,7 +66,9 @@ class GpuEngine : public Engine {
   std::span<const GpuAsset> shapes() const { return shapes_; }
   const GpuInstances& instances() const { return instances_; }
   /// The records of shapes() that a query follows; null where none ever deformed.
-  const GpuAsset* records() const { return deforming_.positions.empty() ? nullptr : list_.records().assets; }
+  GpuAssetRecords records() const {
+    return deforming_.positions.empty() ? GpuAssetRecords{} : list_.records();
+  }
   const RigidMotion* motion_on_gpu() const { return motions_.on_gpu.data(); }
 
   /// Throw what a call that failed calls for. `step`: what was done.

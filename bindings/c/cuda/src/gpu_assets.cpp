@@ -21,8 +21,8 @@ AssetView view_of(const tandem_asset* asset) {
 }
 
 // Copies the records of the assets, and their bounds.
-tandem_status list_assets(tandem_gpu_assets& made, cudaStream_t stream) {
-  const Status status = made.list.set(made.assets.view(), stream);
+tandem_status list_assets(tandem_gpu_assets& made, PositionTypes positions, cudaStream_t stream) {
+  const Status status = made.list.set(made.assets.view(), positions, stream);
   return told(status, status == Status::kOk ? cudaSuccess : cudaGetLastError());
 }
 
@@ -39,7 +39,7 @@ tandem_status upload(tandem_gpu_assets& made, tandem_asset* const* assets, size_
       if (l == 0) made.assets[i] = made.levels[made.levels.size() - 1];
     }
   }
-  return list_assets(made, stream);
+  return list_assets(made, PositionTypes::float32, stream);
 }
 
 // Returns how many of the numbers name an asset that can deform and ascend; `status`: what is wrong with the
@@ -59,13 +59,14 @@ size_t count_of_sound(const tandem_gpu_assets& assets, std::span<const uint32_t>
 }
 
 tandem_status make_deforming(tandem_gpu_assets& made, tandem_gpu_assets& at_rest,
-                             std::span<const uint32_t> deforming, cudaStream_t stream) {
+                             std::span<const uint32_t> deforming, PositionTypes positions,
+                             cudaStream_t stream) {
   tandem_gpu_assets_retain(&at_rest);
   made.at_rest = &at_rest;
   const std::span<const GpuAsset> assets = at_rest.assets.view();
   if (!made.assets.resize(assets.size())) return TANDEM_OUT_OF_MEMORY;
   std::copy(assets.begin(), assets.end(), made.assets.data());
-  if (const tandem_status status = list_assets(made, stream); status != TANDEM_OK) return status;
+  if (const tandem_status status = list_assets(made, positions, stream); status != TANDEM_OK) return status;
   GpuDeformer& deformer = made.deformer.emplace();
   return told(deformer.begin(assets, deforming, made.list.records(), stream), deformer);
 }
@@ -81,10 +82,11 @@ tandem_status with_deformer(tandem_gpu_assets* assets, const Body& body) noexcep
 
 // Runs a call that deforms assets: call(deformer).
 template <typename Call>
-tandem_status deform(tandem_gpu_assets* assets, const float* const* positions, const Call& call) noexcept {
+tandem_status deform(tandem_gpu_assets* assets, const float* const* positions,
+                     const double* const* positions_f64, const Call& call) noexcept {
   return with_deformer(assets, [&](GpuDeformer& deformer) -> tandem_status {
-    if (!is_there(positions, deformer.bodies())) return TANDEM_NULL_ARGUMENT;
-    return told(call(deformer), deformer);
+    if (positions == nullptr && !is_there(positions_f64, deformer.bodies())) return TANDEM_NULL_ARGUMENT;
+    return told(call(deformer, GpuPositions{positions, positions_f64}), deformer);
   });
 }
 
@@ -130,7 +132,7 @@ size_t tandem_gpu_assets_bytes(const tandem_gpu_assets* assets) {
 }
 
 tandem_status tandem_gpu_assets_create_deforming(tandem_gpu_assets* assets, const uint32_t* deforming,
-                                                 size_t count, tandem_stream stream,
+                                                 size_t count, uint32_t takes_f64, tandem_stream stream,
                                                  const tandem_allocator* allocator, tandem_gpu_assets** made,
                                                  uint64_t* where) {
   if (where != nullptr) *where = 0;
@@ -143,7 +145,9 @@ tandem_status tandem_gpu_assets_create_deforming(tandem_gpu_assets* assets, cons
   if (where != nullptr && status != TANDEM_OK) *where = sound;
   if (status != TANDEM_OK) return status;
   return create(allocator, made, [&](tandem_gpu_assets& of) {
-    return make_deforming(of, *assets, {deforming, count}, stream);
+    const PositionTypes positions =
+        takes_f64 != 0 ? PositionTypes::float32_and_float64 : PositionTypes::float32;
+    return make_deforming(of, *assets, {deforming, count}, positions, stream);
   });
 }
 
@@ -152,14 +156,15 @@ size_t tandem_gpu_assets_deforming_count(const tandem_gpu_assets* assets) {
 }
 
 tandem_status tandem_gpu_assets_enqueue_deform(tandem_gpu_assets* assets, const float* const* positions,
-                                               tandem_stream stream) {
-  return deform(assets, positions,
-                [&](GpuDeformer& deformer) { return deformer.enqueue(positions, stream); });
+                                               const double* const* positions_f64, tandem_stream stream) {
+  return deform(assets, positions, positions_f64,
+                [&](GpuDeformer& deformer, const GpuPositions& of) { return deformer.enqueue(of, stream); });
 }
 
 tandem_status tandem_gpu_assets_deform(tandem_gpu_assets* assets, const float* const* positions,
-                                       tandem_stream stream) {
-  return deform(assets, positions, [&](GpuDeformer& deformer) { return deformer.deform(positions, stream); });
+                                       const double* const* positions_f64, tandem_stream stream) {
+  return deform(assets, positions, positions_f64,
+                [&](GpuDeformer& deformer, const GpuPositions& of) { return deformer.deform(of, stream); });
 }
 
 const tandem_gpu_deform_report* tandem_gpu_assets_device_report(const tandem_gpu_assets* assets) {

@@ -98,9 +98,9 @@ tandem_status take_assets(Of* handle, tandem_gpu_assets* given, const Name& name
     tandem_gpu_assets* const before = self.assets;
     self.assets = nullptr;
     Status status = name(self.query);
-    if constexpr (requires { self.query.follow(given->list.records().assets); }) {
+    if constexpr (requires { self.query.follow(given->list.records()); }) {
       if (status == Status::kOk && given->deformer.has_value())
-        status = self.query.follow(given->list.records().assets);
+        status = self.query.follow(given->list.records());
     }
     if (status == Status::kOk) status = self.query.reserve({});
     tandem_status result = told(status, self.query);

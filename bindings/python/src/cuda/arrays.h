@@ -121,6 +121,7 @@ class GivenArray {
 
   const void* data() const { return data_; }
   const std::vector<std::int64_t>& shape() const { return shape_; }
+  const dlpack::DataType& type() const { return type_; }
   /// Throws TypeError where the elements are none of these.
   void require_type(std::initializer_list<dlpack::DataType> types, const char* wanted) const;
   [[noreturn]] void wrong_shape(const char* wanted) const;

@@ -16,8 +16,8 @@ std::uint32_t count_of(std::int64_t length, const GivenArray& array) {
 }  // namespace
 
 Assets::Assets(nb::list assets, int device, std::uint32_t contents, std::vector<std::uint32_t> deforming,
-               const Stream& stream)
-    : device_(device), deforming_(std::move(deforming)) {
+               bool takes_float64, const Stream& stream)
+    : device_(device), takes_float64_(takes_float64), deforming_(std::move(deforming)) {
   const OnDevice current(device);
   upload(assets, contents, stream);
   if (deforming_.empty()) return;
@@ -26,7 +26,7 @@ Assets::Assets(nb::list assets, int device, std::uint32_t contents, std::vector<
   const tandem_status status = [&] {
     const WithoutLock other_threads_run;
     const tandem_status made = tandem_gpu_assets_create_deforming(
-        at_rest, deforming_.data(), deforming_.size(), stream, nullptr, &assets_, &where);
+        at_rest, deforming_.data(), deforming_.size(), takes_float64_, stream, nullptr, &assets_, &where);
     tandem_gpu_assets_release(at_rest);
     return made;
   }();
@@ -76,7 +76,7 @@ void Assets::deform(const Positions& positions, const Stream& stream) const {
   const OnDevice current(device_);
   const tandem_status status = [&] {
     const WithoutLock other_threads_run;
-    return tandem_gpu_assets_deform(assets_, positions.get(), stream);
+    return tandem_gpu_assets_deform(assets_, positions.in_float32(), positions.in_float64(), stream);
   }();
   check_report(status);
 }
@@ -85,7 +85,8 @@ void Assets::enqueue_deform(const Positions& positions, const Stream& stream) co
   const Turn turn(busy_, kBusy);
   positions.require_assets(*this);
   const OnDevice current(device_);
-  check_whole(tandem_gpu_assets_enqueue_deform(assets_, positions.get(), stream));
+  check_whole(
+      tandem_gpu_assets_enqueue_deform(assets_, positions.in_float32(), positions.in_float64(), stream));
   is_queued_ = true;
 }
 
@@ -94,21 +95,27 @@ void Assets::check_queued() const {
 }
 
 Positions::Positions(const Assets& assets, nb::list positions, const Stream& stream) : assets_(&assets) {
-  std::vector<const float*> places;
-  for (const std::uint32_t asset : assets.deforming()) {
-    const nb::object given = positions[places.size()];
-    places.push_back(nullptr);
+  count_ = assets.deforming().size();
+  std::vector<const void*> places(2 * count_);  // in float32, then in float64
+  for (std::size_t i = 0; i < count_; ++i) {
+    const std::uint32_t asset = assets.deforming()[i];
+    const nb::object given = positions[i];
     if (given.is_none()) continue;
     const std::string name = "positions of asset " + std::to_string(asset);
     GivenArray& array = arrays_.emplace_back(given, name.c_str(), stream, assets.device());
-    array.require_type({kF32}, "float32");
+    if (assets.takes_float64())
+      array.require_type({kF32, kF64}, "float32 or float64");
+    else
+      array.require_type({kF32}, "float32");
     const auto count = static_cast<std::int64_t>(assets.source_vertices(asset));
     if (array.shape() != std::vector<std::int64_t>{count, 3})
       array.wrong_shape(("(" + std::to_string(count) + ", 3)").c_str());
-    places.back() = static_cast<const float*>(array.data());
+    const bool is_float64 = array.type() == kF64;
+    has_float64_ = has_float64_ || is_float64;
+    places[is_float64 ? count_ + i : i] = array.data();
   }
   const OnDevice current(assets.device());
-  places_ = std::make_shared<Buffer>(places.size() * sizeof(const float*));
+  places_ = std::make_shared<Buffer>(places.size() * sizeof places[0]);
   check_cuda(
       cudaMemcpyAsync(places_->data(), places.data(), places_->bytes(), cudaMemcpyHostToDevice, stream));
   const cudaError_t error = [&] {
@@ -197,7 +204,7 @@ const tandem_gpu_pair_filter* GpuFilter::of(const GpuFilter* filter, const Insta
 
 void add_scenes(nb::module_& module) {
   nb::class_<Assets>(module, "Assets")
-      .def(nb::init<nb::list, int, std::uint32_t, std::vector<std::uint32_t>, const Stream&>())
+      .def(nb::init<nb::list, int, std::uint32_t, std::vector<std::uint32_t>, bool, const Stream&>())
       .def("deform", &Assets::deform)
       .def("enqueue_deform", &Assets::enqueue_deform)
       .def_prop_ro("device", &Assets::device)

@@ -29,9 +29,9 @@ constexpr const char* kBusy = "the query is at work for another thread";
 /// Copies of assets in the memory of one GPU, of which some may deform.
 class Assets {
  public:
-  /// deforming: ascending.
+  /// deforming: ascending. takes_float64: positions may be in float64 too.
   Assets(nb::list assets, int device, std::uint32_t contents, std::vector<std::uint32_t> deforming,
-         const Stream& stream);
+         bool takes_float64, const Stream& stream);
   ~Assets() { tandem_gpu_assets_release(assets_); }
   Assets(const Assets&) = delete;
   Assets& operator=(const Assets&) = delete;
@@ -45,6 +45,7 @@ class Assets {
 
   /// Returns the numbers of the assets that deform.
   const std::vector<std::uint32_t>& deforming() const { return deforming_; }
+  bool takes_float64() const { return takes_float64_; }
   std::uint64_t source_vertices(std::uint32_t asset) const { return source_vertices_[asset]; }
 
   /// Deforms assets: waits, or queues that alone.
@@ -60,6 +61,7 @@ class Assets {
 
   tandem_gpu_assets* assets_ = nullptr;
   int device_;
+  bool takes_float64_;
   std::vector<std::uint32_t> deforming_;
   std::vector<std::uint64_t> source_vertices_;  // of each asset
   mutable bool is_queued_ = false;              // some call that deforms was queued, or captured
@@ -74,13 +76,19 @@ class Positions {
   Positions(const Assets& assets, nb::list positions, const Stream& stream);
   Positions(const Positions&) = delete;
   Positions& operator=(const Positions&) = delete;
-  const float* const* get() const { return static_cast<const float* const*>(places_->data()); }
+  const float* const* in_float32() const { return static_cast<const float* const*>(places_->data()); }
+  /// Returns null where all arrays are in float32.
+  const double* const* in_float64() const {
+    return has_float64_ ? static_cast<const double* const*>(places_->data()) + count_ : nullptr;
+  }
   /// Throws ValueError where they were made for other assets.
   void require_assets(const Assets& assets) const;
 
  private:
   const Assets* assets_;
   std::vector<GivenArray> arrays_;
+  std::size_t count_ = 0;
+  bool has_float64_ = false;
   std::shared_ptr<Buffer> places_;  // of the arrays
 };
 

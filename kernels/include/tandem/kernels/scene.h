@@ -77,8 +77,7 @@ class Scene {
   /// poses as place() does. Result: kOk; kUnknownAsset; kNoSourceVertices, where the file has none
   /// (FORMAT.md); kVertexCountMismatch; kOutOfRange, where where() is the first vertex with a coordinate that
   /// is NaN or beyond kMaxCoordinate, or the number of vertices where a body then reaches beyond
-  /// kLargestWorldCoordinate; or kOutOfMemory. A scene on a GPU takes float32 numbers alone: also
-  /// kNotFloat32, where where() is the first vertex with another. After an error nothing has changed.
+  /// kLargestWorldCoordinate; or kOutOfMemory. After an error nothing has changed.
   Status deform(std::uint32_t asset, std::span<const float> positions);
   Status deform(std::uint32_t asset, std::span<const double> positions);
 

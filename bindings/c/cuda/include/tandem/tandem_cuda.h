@@ -94,32 +94,36 @@ typedef struct tandem_gpu_deform_report {
 /// Each of them gets a tree of its own, which takes 48 bytes a triangle and 240 a block; all else is shared
 /// with `assets`, to which the new ones keep a reference. They are given to queries as other assets are, and
 /// what queries then find is about the deformed shapes. Tolerance queries refuse them (TANDEM_DEFORMED).
-/// Waits for the stream.
+/// takes_f64: not 0 where positions may be in float64, which takes 72 bytes more a triangle; manifold,
+/// containment and impact queries refuse such assets (TANDEM_NOT_FLOAT32). Waits for the stream.
 ///
 /// Result: TANDEM_UNKNOWN_ASSET; TANDEM_NO_SOURCE_VERTICES, where a file has none or `assets` were uploaded
 /// with TANDEM_CONTENTS_EXACT_QUERIES; TANDEM_BAD_OPTION, where numbers do not ascend or `assets` deform
 /// themselves. where (or null): the place in `deforming`. After an error *made is null.
 TANDEM_API tandem_status tandem_gpu_assets_create_deforming(tandem_gpu_assets* assets,
                                                             const uint32_t* deforming, size_t count,
-                                                            tandem_stream stream,
+                                                            uint32_t takes_f64, tandem_stream stream,
                                                             const tandem_allocator* allocator,
                                                             tandem_gpu_assets** made, uint64_t* where);
 /// How many of them deform.
 TANDEM_API size_t tandem_gpu_assets_deforming_count(const tandem_gpu_assets* assets);
 /// Queues new shapes for assets that deform; queries that are queued behind it find them.
 ///
-/// positions: for each asset that deforms, in their order, x, y, z of each source vertex in float32, in the
-/// file's coordinates, as many as tandem_asset_info says; null: the asset stays as it is. The array of
-/// pointers lies in GPU memory too, and is read when the stream comes to it: a graph that captured the call
-/// may be launched with other pointers in it. An asset whose positions are bad stays as it is, and the report
-/// says so. Where a deformed asset is that of a fixed instance, call tandem_gpu_broad_phase_keep_fixed()
-/// again. Result: TANDEM_ASSETS_MISSING where none deform.
+/// positions, positions_f64: for each asset that deforms, in their order, x, y, z of each source vertex in
+/// float32 or float64, in the file's coordinates, as many as tandem_asset_info says; one of the two arrays of
+/// pointers may be null. An asset with a pointer in neither stays as it is, and float32 counts where it has
+/// one in both. The arrays of pointers lie in GPU memory too, and are read when the stream comes to them: a
+/// graph that captured the call may be launched with other pointers in them. An asset whose positions are bad
+/// stays as it is, and the report says so. Where a deformed asset is that of a fixed instance, call
+/// tandem_gpu_broad_phase_keep_fixed() again. Result: TANDEM_ASSETS_MISSING where none deform;
+/// TANDEM_NOT_FLOAT32, where positions_f64 is not null and the assets were made without takes_f64.
 TANDEM_API tandem_status tandem_gpu_assets_enqueue_deform(tandem_gpu_assets* assets,
                                                           const float* const* positions,
+                                                          const double* const* positions_f64,
                                                           tandem_stream stream);
 /// Deforms assets and waits. Result: as of enqueue, or TANDEM_OUT_OF_RANGE, where the report says which.
 TANDEM_API tandem_status tandem_gpu_assets_deform(tandem_gpu_assets* assets, const float* const* positions,
-                                                  tandem_stream stream);
+                                                  const double* const* positions_f64, tandem_stream stream);
 TANDEM_API const tandem_gpu_deform_report* tandem_gpu_assets_device_report(const tandem_gpu_assets* assets);
 TANDEM_API tandem_status tandem_gpu_assets_get_report(const tandem_gpu_assets* assets,
                                                       tandem_gpu_deform_report* report);

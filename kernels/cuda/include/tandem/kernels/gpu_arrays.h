@@ -58,6 +58,19 @@ struct GpuAssetBounds {
   std::uint32_t count;
 };
 
+/// The numbers in which positions of a deforming body may be given.
+enum class PositionTypes : std::uint8_t { float32, float32_and_float64 };
+
+/// What queries need to know of each asset of a list, and what a broad phase needs, in GPU memory.
+struct GpuAssetRecords {
+  GpuAsset* assets = nullptr;
+  AssetBounds* bounds = nullptr;
+  std::uint32_t count = 0;
+  PositionTypes positions = PositionTypes::float32;  ///< by which assets of the list may be deformed
+
+  GpuAssetBounds bounds_of_all() const { return {bounds, count}; }
+};
+
 /// Instances as arrays in GPU memory, which a simulation may write there. Poses apply to the file's
 /// coordinates.
 struct GpuInstances {

@@ -17,21 +17,20 @@ template <typename Report>
 struct HostOf;
 }
 
-/// What queries need to know of each asset of a list, and what a broad phase needs, in GPU memory.
-struct GpuAssetRecords {
-  GpuAsset* assets;
-  AssetBounds* bounds;
-  std::uint32_t count;
-
-  GpuAssetBounds bounds_of_all() const { return {bounds, count}; }
+/// The positions of some bodies, in GPU memory as what they point to: of each body the x, y, z of each source
+/// vertex, in the file's coordinates, as many as FileHeader::source_vertices.
+struct GpuPositions {
+  const float* const* in_float32 = nullptr;   ///< of each body, or null; the whole array may be null
+  const double* const* in_float64 = nullptr;  ///< the same; looked at where a body has none in float32
 };
 
 /// Owns the records of a list of assets.
 class GpuAssetList {
  public:
-  /// Copies the list to the current device behind what `stream` holds, and waits for that. Result: kOk,
-  /// kOutOfRange (2^32 - 1 assets), kOutOfMemory, or another that status_of() of gpu_status.h names.
-  Status set(std::span<const GpuAsset> assets, cudaStream_t stream);
+  /// Copies the list to the current device behind what `stream` holds, and waits for that. positions: by
+  /// which assets may be deformed. Result: kOk, kOutOfRange (2^32 - 1 assets), kOutOfMemory, or another that
+  /// status_of() of gpu_status.h names.
+  Status set(std::span<const GpuAsset> assets, PositionTypes positions, cudaStream_t stream);
 
   const GpuAssetRecords& records() const { return records_; }
   std::size_t bytes() const { return assets_.bytes() + bounds_.bytes(); }
@@ -68,7 +67,8 @@ class GpuDeformer {
   /// Names the bodies that deform: each is an asset of the list, whose tree is copied on the current device
   /// behind what `stream` holds. The record of the asset names the copy from then on, in the shape that it
   /// has in the file. Returns when that is done. Holds, for each body, the bytes of its triangles, blocks and
-  /// oriented blocks. Takes the trees back to the CPU once for each that is another.
+  /// oriented blocks, and 72 for each triangle where the records say that positions may be in float64.
+  /// Takes the trees back to the CPU once for each that is another.
   ///
   /// bodies: ascending numbers in the list. records: of the list, in GPU memory; they outlive the deformer.
   /// What the assets' trees point to, but for what is copied, outlives the queries. Result: kOk;
@@ -82,17 +82,21 @@ class GpuDeformer {
   /// GPU nor allocates. All bodies take their new shapes by as many kernels as one body of the most triangles
   /// does: four of up to some 60,000.
   ///
-  /// positions: in GPU memory, as what they point to: of each body the x, y, z of each source vertex in
-  /// float32, in the file's coordinates, as many as FileHeader::source_vertices; null: the body stays as it
-  /// is. A body whose positions are bad stays as it is, too, and the first is reported. Result: kOk or what
-  /// CUDA said.
-  Status enqueue(const float* const* positions, cudaStream_t stream);
+  /// A body that has no positions stays as it is. A body whose positions are bad stays as it is, too, and the
+  /// first is reported. Positions in float64 take a kernel more. Where all of a body are float32 numbers they
+  /// count as these. Result: kOk; kNotFloat32, where there are positions in float64 and begin() was not told
+  /// of such; or what CUDA said.
+  Status enqueue(const GpuPositions& positions, cudaStream_t stream);
 
   /// Deforms the bodies, and waits for the end. Result: that of the report, or of a call that failed.
-  Status deform(const float* const* positions, cudaStream_t stream);
+  Status deform(const GpuPositions& positions, cudaStream_t stream);
 
   std::uint32_t bodies() const;
-  LevelView level(std::uint32_t body) const;     ///< its deformed tree, with pointers into GPU memory
+
+  /// Returns the deformed tree of a body, with pointers into GPU memory. `precise` says where the positions
+  /// in float64 go, if such may be given; whether they count is in the record.
+  LevelView level(std::uint32_t body) const;
+
   const GpuDeformReport* device_report() const;  ///< in GPU memory, where it is written when the call ends
 
   /// Returns the report, in CPU memory. Condition: the stream has come to the end of the call.

@@ -75,10 +75,11 @@ class GpuAssetQuestion : public GpuQuestion<Capacity, Report, Options> {
   Status set_assets(std::span<const GpuAsset> assets, cudaStream_t stream);
 
   /// Says that assets deform: calls to come take what is to be known of them from these records of the list,
-  /// in GPU memory, as a GpuDeformer writes them there. Null, as after set_assets(): they take what
-  /// set_assets() was given. Result: kOk, or kDeformed where the question is not offered for deformed assets.
-  /// Condition: set_assets().
-  Status follow(const GpuAsset* records);
+  /// in GPU memory, as a GpuDeformer writes them there. No records, as after set_assets(): they take what
+  /// set_assets() was given. Result: kOk; kDeformed, where the question is not offered for deformed assets;
+  /// or kNotFloat32, where it is not offered for positions in float64, and the records say that there may be
+  /// such. After an error nothing has changed. Condition: set_assets().
+  Status follow(const GpuAssetRecords& records);
 };
 
 }  // namespace tandem

@@ -65,7 +65,7 @@ Vector3 RowMaker::velocity_at(std::uint32_t body, const Vector3& arm) const {
   return states_[body].velocity + cross(states_[body].angular_velocity, arm);
 }
 
-// How gravity and lasting forces accelerate it.
+// Returns how gravity and lasting forces accelerate the place of a contact.
 Vector3 RowMaker::pull_at(std::uint32_t body, const Vector3& arm) const {
   if (!is_moved(body)) return Vector3{};
   return input_.pulls[body].linear + cross(input_.pulls[body].angular, arm);

@@ -47,7 +47,7 @@ struct ContactRows {
   double friction_mobility() const { return std::max(first.mobility(), second.mobility()); }
 };
 
-/// How the bodies of a contact meet.
+/// Says how the bodies of a contact meet.
 struct ContactMeeting {
   Vector3 arm_a, arm_b;  ///< of the contact, from the centres of mass
   Vector3 velocity;      ///< of b's point as seen from a's

@@ -14,7 +14,7 @@ struct PairApart {
   double distance = 0;
 };
 
-/// What is known of distances: where bodies stood then, and the pairs that were apart, ascending.
+/// Has what is known of distances: where bodies stood then, and the pairs that were apart, ascending.
 struct AheadState {
   std::vector<BodyState> before;
   std::vector<PairApart> apart;
@@ -69,7 +69,7 @@ class ContactsAhead {
     std::size_t place;
     ObjectDistance distance;
   };
-  /// How far bodies have gone from one state to another.
+  /// Tells how far bodies have gone from one state to another.
   class Ways {
    public:
     void find(std::span<const BodyProperties> bodies, std::span<const BodyState> from,

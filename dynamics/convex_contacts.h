@@ -118,7 +118,7 @@ class ConvexContacts {
     }
   }
 
-  // What velocities miss of y* and the impulses, after minimise().
+  // Returns what velocities miss of y* and the impulses, after minimise().
   const std::vector<Vector6>& gradient() const { return gradient_; }
 
   double joint_softness(std::size_t row) const { return joint_softness_[row]; }
@@ -183,7 +183,7 @@ class ConvexContacts {
     }
   }
 
-  // How a y is drawn to where it is to be near.
+  // Returns how a y is drawn to where it is to be near.
   Vector6 drawn(const ConvexGoal& goal, std::size_t j, const Vector6& y) const {
     if (goal.nearness.empty()) return {};
     return drawn_by(goal, j, y - goal.near[j]);

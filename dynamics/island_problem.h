@@ -92,8 +92,8 @@ struct IslandProblem {
   }
 };
 
-/// What a contact leaves undone. target: of the velocity along the normal. share: part of the problem's
-/// impulses that the law is asked of.
+/// Returns what a contact leaves undone. target: of the velocity along the normal. share: part of the
+/// problem's impulses that the law is asked of.
 Residual residual_of(const IslandProblem& problem, std::size_t contact, double target, double share);
 
 /// The bodies at the start of a step, and the impulses that its contacts start with.

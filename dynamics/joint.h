@@ -36,7 +36,7 @@ struct Joint {
 /// A joint has at most this many rows, each with a slot for what it remembers.
 inline constexpr std::size_t kMostJointRows = 7;
 
-/// What a joint keeps from step to step.
+/// Has what a joint keeps from step to step.
 struct JointMemory {
   std::array<double, kMostJointRows> impulse = {};  ///< that the next step starts with
   double position = 0;                              ///< angle, way or distance; an angle counts whole turns

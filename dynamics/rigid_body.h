@@ -42,7 +42,7 @@ struct BodyForce {
   friend bool operator==(const BodyForce&, const BodyForce&) = default;
 };
 
-/// What gravity and forces add to a body's velocities in a second.
+/// Says what gravity and forces add to a body's velocities in a second.
 struct Pull {
   Vector3 linear, angular;
   double turning = 0;  ///< to the velocity of any of its points by `angular`, at most

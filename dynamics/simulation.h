@@ -60,7 +60,7 @@ struct SimulationState {
   std::vector<JointMemory> joint_memory;
 };
 
-/// What a simulation is made of, beside its bodies.
+/// A simulation is made of these, beside its bodies.
 struct SimulationParts {
   std::unique_ptr<ContactFinder> contacts;
   std::unique_ptr<ContactsAhead> ahead = nullptr;          ///< null: bodies are stopped when they overlap
@@ -110,7 +110,7 @@ class Simulation {
   const Touches& touches() const { return touches_; }
   std::span<const Joint> joints() const { return joints_; }
 
-  /// What each joint did in the last step, and where it is.
+  /// Returns what each joint did in the last step, and where it is.
   std::span<const JointMemory> joint_memory() const { return joint_memory_; }
 
   /// Gives a joint's motor another target and greatest effort, and wakes what it joins.

@@ -68,7 +68,7 @@ TANDEM_INLINE void put(const Vector3Of<L>& p, SoftNumber (&to)[3], int lane) {
   put(p.x, to[0], lane), put(p.y, to[1], lane), put(p.z, to[2], lane);
 }
 
-/// How the body of each lane moves.
+/// Says how the body of each lane moves.
 template <typename L>
 struct MotionOf {
   Vector3Of<L> centre, spin;

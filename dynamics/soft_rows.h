@@ -38,7 +38,7 @@ struct SoftNormal {
   SoftNumber impulse;
 };
 
-/// What few sweeps look at.
+/// Has what few sweeps look at.
 struct SoftGap {
   SoftNumber separation;  ///< at the start of the step
   SoftNumber opposed;     ///< by how much depth the push is less
@@ -54,7 +54,7 @@ struct SoftFriction {
   SoftNumber sum_of_normal, sum_of_first, sum_of_second;  ///< of the impulses of all substeps
 };
 
-/// How each pair turns, and what resists that.
+/// Says how each pair turns, and what resists that.
 struct SoftTurning {
   SoftNumber spread_a[9], spread_b[9];  ///< turn spins into those of the world, row by row
   SoftNumber drive[3], mass, lever, impulse[3];

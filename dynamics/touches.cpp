@@ -11,7 +11,7 @@ namespace {
 
 constexpr auto kBodies = bodies_of<WorldTouch>;
 
-// What the contacts of one pair do together.
+// This sums up what the contacts of one pair do together.
 class PairTouch {
  public:
   explicit PairTouch(const ContactPoint& first) : touch_{first.body_a, first.body_b, 0, 0, {}} {}

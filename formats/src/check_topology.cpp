@@ -97,7 +97,7 @@ class JoinedWindings {
     }
     return {t, differs};
   }
-  /// Whether the relation contradicts those before.
+  /// Returns whether the relation contradicts those before.
   bool contradicts(std::uint32_t s, std::uint32_t t, std::uint8_t differ) {
     const Place a = place(s), b = place(t);
     const auto between = static_cast<std::uint8_t>(a.differs ^ b.differs ^ differ);
@@ -235,7 +235,7 @@ class TopologyCheck {
     return Status::kOk;
   }
 
-  // Whether no bit is set of a side that belongs to no edge: for_each_edge() does not come by it.
+  // Checks that a side that belongs to no edge has no bit: for_each_edge() does not come by it.
   Status check_sides_without_edge() {
     for (std::uint32_t t = 0; t < level_.triangle_count; ++t) {
       const TriangleTopology& triangle = level_.topology[t];
@@ -260,7 +260,7 @@ class TopologyCheck {
     }
   }
 
-  // Whether a side runs from its lower to its upper vertex, once its triangle is turned where it should be.
+  // Returns whether a side runs from its lower to its upper vertex once its triangle is turned as it should.
   bool runs_up(std::uint32_t side) const {
     const TriangleTopology& triangle = level_.topology[side / 3];
     return (triangle.vertex[side % 3] < triangle.vertex[(side + 1) % 3]) != is_turned(triangle.flags);

@@ -265,23 +265,4 @@ TANDEM_HD inline TriangleDistance triangle_distance(const TrianglePair& t,
   return out;
 }
 
-/// The distance of a triangle, t.a, from a point, three times in t.b. As triangle_distance(), but with a
-/// guess that takes less time.
-TANDEM_HD inline TriangleDistance point_distance(const TrianglePair& t, const DistanceTolerance& tolerance) {
-  const distance::LocalPair local = distance::local_pair(t);
-  if (local.in_range()) {
-    distance::Point<double> from_point[3];
-    for (int i = 0; i < 3; ++i) from_point[i] = distance::minus(local.a[i], local.b[0]);
-    const auto nearest = distance::nearest_to_origin<double>(from_point, 0x1p-480);
-    TriangleDistance out;
-    TriangleWeights weights = {};
-    out.interval = distance::bounded_distance(local, nearest, tolerance, weights);
-    if (out.interval.lower != 0 && is_narrow(out.interval, tolerance)) {
-      distance::write_points(t, weights, out);
-      return out;
-    }
-  }
-  return triangle_distance(t, tolerance);
-}
-
 }  // namespace tandem

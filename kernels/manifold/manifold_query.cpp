@@ -63,7 +63,7 @@ struct ManifoldQuery::State : Allocated {
     Buffer<ManifoldPoint>& points;
   };
 
-  // What was found, to be moved if it is kept; each entry is about the manifold or point of the same index.
+  // This has what was found, to be moved if it is kept; each entry is about the row of the same index.
   struct Found {
     Buffer<FoundManifold> manifolds;
     Buffer<FoundPoint> points;
@@ -308,7 +308,7 @@ bool ManifoldQuery::State::remember_step(std::span<const ObjectPair> pairs) {
   return true;
 }
 
-// What is kept is what the call before found. The device knows by itself what it found.
+// Checks that the call before found what is to be kept. The device knows by itself what it found.
 Status ManifoldQuery::State::check_kept(SceneState& scene, const Asked& asked, bool on_device) const {
   if (asked.moved == nullptr) return Status::kOk;
   const MovedQuery& moved = *asked.moved;

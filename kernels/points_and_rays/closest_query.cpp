@@ -44,7 +44,7 @@ struct SurfaceLabels {
   std::uint32_t first;  // of the labels; kNoIndex: all triangles are of closed components
 };
 
-// What the ray from a point to +x crosses.
+// This counts what the ray from a point to +x crosses.
 struct CrossingCount {
   const PosedTree* tree;
   const double* point;

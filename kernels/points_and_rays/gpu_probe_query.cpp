@@ -18,7 +18,7 @@ constexpr std::uint64_t one_more(std::uint64_t count) {
   return count + 1;
 }
 
-// What the questions are about.
+// These tell what a question is about.
 std::uint32_t probes_in(const GpuClosestOptions& options) {
   return options.point_count;
 }

@@ -24,7 +24,7 @@ struct PlannedTree {
   RefitPlan plan;
 };
 
-/// What a level has in CPU memory, as far as plans need it.
+/// This is a level in CPU memory, as far as plans need it.
 struct DownloadedLevel {
   LevelView level;
   Buffer<Triangle> triangles;
@@ -54,7 +54,7 @@ struct HostOf<GpuDeformReport> : GpuHost<DeformState, GpuDeformReport> {
   Buffer<LevelView> levels;  // of the bodies
   DeformArgs args = {};
 
-  // What begin() makes on the way.
+  // begin() makes these on the way.
   Buffer<DeformingBody> bodies;
   Buffer<PlannedTree> planned;  // each tree once
   Buffer<std::uint32_t> plan_of;

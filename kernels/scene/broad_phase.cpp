@@ -435,7 +435,7 @@ Status BroadPhase::keep_fixed(std::span<const WorldBox> boxes, std::span<const M
   return keep_fixed(boxes, motion, world, none, 1);
 }
 
-// Where none of the boxes is fixed, none are kept.
+// Keeps the fixed boxes; none are kept where none is fixed.
 Status BroadPhase::keep_fixed(std::span<const WorldBox> boxes, std::span<const Motion> motion,
                               const std::uint32_t* world, WorkerThreads& threads, std::uint32_t workers) {
   const Team team = {threads, workers};

@@ -97,7 +97,7 @@ __global__ void unpack_keys(const unsigned long long* keys, std::uint32_t capaci
 }
 
 // ---------------------------------------------------------------------------------------------------------
-// How work is cut.
+// These functions cut the work.
 
 std::uint32_t blocks_for(std::uint64_t threads, std::uint32_t size) {
   return static_cast<std::uint32_t>((threads + size - 1) / size);
@@ -240,7 +240,7 @@ struct gpu::HostOf<GpuBroadPhaseReport> : gpu::GpuHost<Outcome, GpuBroadPhaseRep
     return ok(sorted_pairs.reserve(of_pairs.count())) && reserve_sorting();
   }
 
-  // What was kept in room that is too small now is lost.
+  // Makes room for boxes. If the room grows, the boxes that were kept in it are lost.
   bool reserve_taken(std::uint32_t count) {
     if (count > boxes.room() && kept.of != 0 && kept.posed) kept.of = Kept::kLost;
     return ok(boxes.reserve(count));

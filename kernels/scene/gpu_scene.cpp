@@ -356,7 +356,7 @@ class Gpu final : public SceneDevice {
     return status == Status::kOk ? wait() : status;
   }
 
-  // What a question about the pairs that have moved found on the CPU; pairs_ are all of them.
+  // Uploads what a question about moved pairs found on the CPU; pairs_ are all of them.
   Status upload_moved(const SceneState& scene, const MovedQuery& moved, GpuMoved& on_gpu) {
     const std::size_t pairs = moved.pairs().size(), rows = moved.rows().size();
     if (!boxes_.resize(scene.assets.size()) || !moved_rows_.resize(pairs) || !row_of_moved_.resize(rows))

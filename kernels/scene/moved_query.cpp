@@ -45,7 +45,7 @@ struct MovedQuery::State : Allocated {
               const MovedOptions& options, std::uint32_t* kept_rows, PosedBodies* posed) const;
 };
 
-// What was found of other assets is not kept.
+// Makes the boxes of the assets. It forgets what was found of other assets.
 bool MovedQuery::State::box_assets(const SceneState& scene) {
   if (assets_id != scene.assets_id) {
     assets_id = 0;

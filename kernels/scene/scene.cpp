@@ -12,7 +12,7 @@
 namespace tandem {
 namespace {
 
-// Whether a body that was placed, and not removed, stands as another instance says.
+// Returns whether a body that was placed, and not removed, stands as another instance says.
 bool stands_so(const Instance& x, const Instance& y) {
   return x.asset != kNoIndex && x.asset == y.asset && std::memcmp(&x.pose, &y.pose, sizeof(Pose)) == 0;
 }

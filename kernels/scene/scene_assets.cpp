@@ -58,7 +58,7 @@ Status SceneState::set_assets(std::span<const AssetView> views) {
   return device->set_assets(*this);
 }
 
-// Whether all bodies of an asset stay where queries take them if it has these bounds.
+// Returns whether all bodies of an asset stay where queries take them if it has these bounds.
 bool SceneState::stays_in_range(std::uint32_t asset, const float (&lower)[3], const float (&upper)[3]) const {
   return std::all_of(instances.data(), instances.data() + instances.size(), [&](const Instance& instance) {
     return instance.asset != asset || in_range(world_box(instance.pose, lower, upper));

@@ -23,7 +23,7 @@ class AnimatedScene {
 
   const BendingScene& scene() const { return scene_; }
 
-  /// The same as a scene of one asset, for errors.
+  /// Returns the mesh as a scene of one asset, for errors.
   const LoadedScene& names() const { return names_; }
 
  private:

@@ -15,7 +15,7 @@ struct ImpactPeer : PeerTimes {
   std::uint64_t invented = 0;  ///< of them, those that surely have no contact in the step
   std::uint64_t missed = 0;    ///< pairs without one, though a contact was found
   std::uint64_t late = 0;      ///< pairs whose time is after that of a contact that was found
-  /// How early or late times are, of pairs whose time is sure to be early or late, in parts of the step.
+  /// These say how early or late times are that are surely early or late, in parts of the step.
   double median_early = 0, most_early = 0, most_late = 0;
 };
 

@@ -36,7 +36,7 @@ using FrameOfShapes = std::vector<ShapeInFrame>;
 std::optional<double> deform(Engine& engine, const FrameOfShapes& frame, const std::string& path,
                              std::uint32_t number);
 
-/// What a peer did of a frame. Seconds are the least of the repeats; a query is asked once before it is
+/// Says what a peer did of a frame. Seconds are the least of the repeats; a query is asked once before it is
 /// timed. On a GPU its own clock tells them, and the query is a graph of the broad phase and the contacts.
 struct FrameWork {
   double update_seconds = 0;  ///< until its trees are those of the frame: refitted, or built anew
@@ -46,7 +46,7 @@ struct FrameWork {
   std::optional<double> looseness;           ///< the largest of the shapes', where the peer tells
 };
 
-/// What a peer did of all frames.
+/// Says what a peer did of all frames.
 struct PeerFrames {
   std::string name, settings;
   std::vector<std::optional<FrameWork>> frames;  ///< nothing: the peer has no tree for the frame

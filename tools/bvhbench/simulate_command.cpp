@@ -247,7 +247,7 @@ ExitCode run(const char* kind, SimulateArguments arguments, const SetUp& set_up)
   std::unique_ptr<ContinuousMotion> continuous;
   if (arguments.continuous)
     continuous = std::make_unique<ContinuousMotion>(start.shapes(), options.threads, &start.filter);
-  // What World does.
+  // World does the same.
   const bool is_world = arguments.engine == "tandem" && !arguments.fast && !arguments.ask_all;
   Simulator simulator(start.bodies.bodies, start.bodies.states,
                       is_world ? make_scene_contacts(start.shapes(), options.threads, &start.filter)

@@ -15,7 +15,7 @@ struct BuiltLevel : LevelParts {
   Geometry geometry;  ///< looks at `mesh` or at the stored mesh
   std::vector<std::uint32_t> face;
   double error_bound = 0;
-  /// Of each point; empty of coarser levels, whose points are no vertices of the file.
+  /// This names the vertex of each point; it is empty for coarser levels, whose points are none of the file.
   std::span<const std::uint32_t> source_vertex{};
 
   /// Returns what the file gets of the level.

@@ -8,7 +8,7 @@
 
 namespace tandem::build {
 
-/// What a tree costs in one sample of an animation, against a tree that is built for that sample alone.
+/// Says what a tree costs in one sample of an animation, against a tree built for that sample alone.
 struct SampleWork {
   std::string name;
   /// Mean block pairs of the refitted tree and of the sample's own tree; none where either takes too many.
@@ -22,7 +22,7 @@ struct SampleWork {
 std::vector<SampleWork> measure_samples(const Geometry& geometry, const Tree& tree,
                                         const BuildOptions& options, const std::vector<std::string>& names);
 
-/// How many times the work of the samples' own trees a tree takes: over all samples together, and in the one
+/// Says how many times the work of the samples' own trees a tree takes: over all samples, and in the one
 /// where that is worst.
 struct SampleSummary {
   double mean_ratio = 0, worst_ratio = 0;
@@ -32,7 +32,7 @@ struct SampleSummary {
 /// Returns nothing where nothing could be measured.
 std::optional<SampleSummary> summary_of(const std::vector<SampleWork>& samples);
 
-/// What reports and files say of the samples: docs/json.md has the keys.
+/// Returns what reports and files say of the samples: docs/json.md has the keys.
 Json samples_json(const std::vector<SampleWork>& samples);
 
 }  // namespace tandem::build

@@ -31,7 +31,7 @@ class Column {
   Bytes bytes_;
 };
 
-// What geoms and explicit pairs both have.
+// Geoms and explicit pairs both have these.
 struct Properties {
   Properties(nb::handle model, const std::string& kind, const std::string& size)
       : dim(model, kind + size),
@@ -73,7 +73,7 @@ struct Model {
   std::optional<Column<double, 6>> surfacevel;  // from MuJoCo 4 on
 };
 
-// What MuJoCo combines of two geoms, or takes from the <pair> that they are. Members have the names of
+// MuJoCo combines these of two geoms, or takes from the <pair> that they are. Members have the names of
 // mjContact's.
 struct Parameters {
   std::int32_t dim = 0;
@@ -86,7 +86,7 @@ void copy(const Value (&from)[size], Value (&to)[size]) {
   std::copy(from, from + size, to);
 }
 
-// What the first of two geoms counts, as mj_contactParam() decides.
+// Returns what the first of two geoms counts, as mj_contactParam() decides.
 double share_of_first(const Model& model, std::size_t i, std::size_t j) {
   const int first = model.priority[i][0], second = model.priority[j][0];
   if (first != second) return first > second ? 1 : 0;
@@ -449,7 +449,7 @@ class MujocoContacts {
   std::vector<bool> is_ours_;
   std::vector<Plane> planes_;
   std::atomic<bool> busy_ = false;
-  // Of the last call.
+  // These are of the last call.
   const double (*place_)[3] = nullptr;
   const double (*rotation_)[3][3] = nullptr;
   bool is_overridden_ = false;

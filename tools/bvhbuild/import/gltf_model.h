@@ -125,7 +125,7 @@ Affine affine_of(const GltfParts& parts);
 /// affine.
 GltfModel read_gltf_model(const GltfObject& root, GltfBufferPlaces places);
 
-/// Whether assimp may be able to read a file that was refused with this error: glTF 1, or Draco compression.
+/// Returns whether assimp may read a file that was refused with this error: glTF 1, or Draco compression.
 bool is_for_another_gltf_reader(std::string_view error);
 
 }  // namespace tandem::build

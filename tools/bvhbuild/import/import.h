@@ -21,7 +21,7 @@ struct ReadLimits {
   /// and counts promise elements without data. assimp may take 192 bytes of memory for each of them and for
   /// each byte of the file. A tree over 4 million faces takes below 1 GiB and 10 s.
   std::uint64_t expansion = 4'000'000;
-  /// Whether a file that a scene names may lie elsewhere than in the scene's folder or below it.
+  /// Says whether a file that a scene names may lie elsewhere than in the scene's folder or below it.
   bool outside_files = false;
 };
 

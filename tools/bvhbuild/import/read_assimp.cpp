@@ -162,7 +162,7 @@ class SceneFiles : public Assimp::DefaultIOSystem {
   /// The files that were opened beside the scene.
   const std::vector<std::string>& files() const { return files_; }
 
-  /// Whether a file was not opened because of where it lies.
+  /// Returns whether a file was not opened because of where it lies.
   bool met_outside_file() const { return met_outside_file_; }
 
  private:

@@ -194,7 +194,7 @@ class HeaderReader {
 
 /// Reads the header of a PLY file into `header`.
 ///
-/// How lines end is decided by the first one, so that binary data may begin with a byte that looks like a
+/// The first line decides how lines end, so that binary data may begin with a byte that looks like a
 /// line end.
 /// Result: empty, or the reason why the header cannot be read, with its line.
 std::string read_ply_header(std::string_view bytes, PlyHeader& header) {

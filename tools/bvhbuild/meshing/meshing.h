@@ -52,7 +52,7 @@ struct TriangleMesh {
   std::vector<Point> points;
   std::vector<TriangleIndices> triangles;
   std::vector<std::uint32_t> face;  ///< of each triangle: the face of the file that it is a piece of
-  /// Of each point: the vertex of the file, ascending. Empty: point i is vertex i.
+  /// This names the vertex of the file of each point, ascending. Empty: point i is vertex i.
   std::vector<std::uint32_t> source_vertex{};
   /// These say where the points are in other samples of an animation. They are finite and at most
   /// kMaxCoordinate in magnitude.

@@ -13,16 +13,16 @@ const double* triples_of(const GivenArray& given, std::uint32_t& count) {
   return static_cast<const double*>(given.data());
 }
 
-template <typename Probes>
+template <typename Of>
 constexpr std::size_t row_bytes() {
-  return sizeof(*Probes::rows(nullptr));
+  return sizeof(*Of::rows(nullptr));
 }
 
 }  // namespace
 
 Points::Points(nb::handle points, std::optional<double> reach, double absolute, double relative, bool sides,
                const Stream& stream, int device)
-    : points_(points, "points", stream, device), options_(sized<tandem_gpu_closest_options>()) {
+    : points_(points, "points", stream, device) {
   options_.points = triples_of(points_, options_.point_count);
   options_.limit_reach = reach.has_value();
   options_.reach = reach.value_or(0);
@@ -33,9 +33,7 @@ Points::Points(nb::handle points, std::optional<double> reach, double absolute, 
 
 Rays::Rays(nb::handle origins, nb::handle directions, std::optional<double> reach, std::uint32_t hits,
            const Stream& stream, int device)
-    : origins_(origins, "origins", stream, device),
-      directions_(directions, "directions", stream, device),
-      options_(sized<tandem_gpu_ray_options>()) {
+    : origins_(origins, "origins", stream, device), directions_(directions, "directions", stream, device) {
   std::uint32_t count = 0;
   options_.origins = triples_of(origins_, options_.ray_count);
   options_.directions = triples_of(directions_, count);
@@ -45,15 +43,15 @@ Rays::Rays(nb::handle origins, nb::handle directions, std::optional<double> reac
   options_.reach = reach.value_or(0);
 }
 
-template <typename Probes>
-Rows Query::probe(nb::object instances, const Probes& probes, const Stream& stream) {
+template <typename Of>
+Rows Query::probe(nb::object instances, const Of& probes, const Stream& stream) {
   const Turn turn(busy_, kBusy);
   const OnDevice current(device());
   const Instances& bodies = bodies_of(instances, device());
   const auto query = probe_queries_.take(assets_, stream);
   const auto report =
       ProbeQueries::run(query, [&](tandem_gpu_probe_query* of) { return probes.find(of, bodies, stream); });
-  return {memory_of(query, stream), Probes::rows(query.get()), report.rows, row_bytes<Probes>()};
+  return {memory_of(query, stream), Of::rows(query.get()), report.rows, row_bytes<Of>()};
 }
 
 template Rows Query::probe(nb::object, const Points&, const Stream&);
@@ -69,17 +67,17 @@ ProbeStep::ProbeStep(nb::object assets, std::uint32_t instances, std::uint32_t p
   check_whole(tandem_gpu_probe_query_reserve(query_.get(), &room));
 }
 
-template <typename Probes>
+template <typename Of>
 Rows ProbeStep::enqueue(nb::object instances, nb::object given, const Stream& stream) {
   const Turn turn(busy_, kBusy);
   const OnDevice current(assets_.device());
   const Instances& bodies = bodies_of(instances, assets_.device());
-  const Probes& probes = nb::cast<const Probes&>(given);
+  const Of& probes = nb::cast<const Of&>(given);
   begin(stream);
   check_whole(probes.enqueue(query_.get(), bodies, stream));
   instances_ = instances;
   probes_ = given;
-  return {memory_of(query_), Probes::rows(query_.get()), probes.row_room(hit_room_), row_bytes<Probes>()};
+  return {memory_of(query_), Of::rows(query_.get()), probes.row_room(hit_room_), row_bytes<Of>()};
 }
 
 template Rows ProbeStep::enqueue<Points>(nb::object, nb::object, const Stream&);

@@ -88,47 +88,46 @@ struct FoundPairs {
   std::size_t count = 0;
 };
 
-/// Points of the world, somebody's array, and what is asked about them.
-class Points {
+/// Probes of the world, somebody's arrays, and what is asked about them by these functions of C.
+template <typename Options, auto find_probes, auto enqueue_probes, auto rows_of>
+class Probes {
+ public:
+  tandem_status find(tandem_gpu_probe_query* query, const Instances& bodies, const Stream& stream) const {
+    return find_probes(query, &bodies.get(), &options_, stream);
+  }
+  tandem_status enqueue(tandem_gpu_probe_query* query, const Instances& bodies, const Stream& stream) const {
+    return enqueue_probes(query, &bodies.get(), &options_, stream);
+  }
+  static auto rows(const tandem_gpu_probe_query* query) { return rows_of(query); }
+
+ protected:
+  Options options_ = sized<Options>();
+};
+
+class Points : public Probes<tandem_gpu_closest_options, tandem_gpu_probe_query_find_closest,
+                             tandem_gpu_probe_query_enqueue_closest, tandem_gpu_probe_query_closest> {
  public:
   Points(nb::handle points, std::optional<double> reach, double absolute, double relative, bool sides,
          const Stream& stream, int device);
-  std::uint32_t count() const { return options_.point_count; }
-  tandem_status find(tandem_gpu_probe_query* query, const Instances& bodies, const Stream& stream) const {
-    return tandem_gpu_probe_query_find_closest(query, &bodies.get(), &options_, stream);
-  }
-  tandem_status enqueue(tandem_gpu_probe_query* query, const Instances& bodies, const Stream& stream) const {
-    return tandem_gpu_probe_query_enqueue_closest(query, &bodies.get(), &options_, stream);
-  }
-  static auto rows(const tandem_gpu_probe_query* query) { return tandem_gpu_probe_query_closest(query); }
-  /// The rows that there is room for, where `hits` were reserved.
-  std::uint32_t row_room(std::uint32_t) const { return count(); }
+  /// Returns the rows that there is room for, where `hits` were reserved.
+  std::uint32_t row_room(std::uint32_t) const { return options_.point_count; }
 
  private:
   GivenArray points_;
-  tandem_gpu_closest_options options_;
 };
 
-/// Rays of the world, somebody's arrays, and what is asked about them.
-class Rays {
+class Rays : public Probes<tandem_gpu_ray_options, tandem_gpu_probe_query_find_rays,
+                           tandem_gpu_probe_query_enqueue_rays, tandem_gpu_probe_query_rays> {
  public:
   Rays(nb::handle origins, nb::handle directions, std::optional<double> reach, std::uint32_t hits,
        const Stream& stream, int device);
-  std::uint32_t count() const { return options_.ray_count; }
-  tandem_status find(tandem_gpu_probe_query* query, const Instances& bodies, const Stream& stream) const {
-    return tandem_gpu_probe_query_find_rays(query, &bodies.get(), &options_, stream);
-  }
-  tandem_status enqueue(tandem_gpu_probe_query* query, const Instances& bodies, const Stream& stream) const {
-    return tandem_gpu_probe_query_enqueue_rays(query, &bodies.get(), &options_, stream);
-  }
-  static auto rows(const tandem_gpu_probe_query* query) { return tandem_gpu_probe_query_rays(query); }
+  /// Returns what Points::row_room() does.
   std::uint32_t row_room(std::uint32_t hits) const {
-    return options_.hits == TANDEM_ALL_HITS ? hits : count();
+    return options_.hits == TANDEM_ALL_HITS ? hits : options_.ray_count;
   }
 
  private:
   GivenArray origins_, directions_;
-  tandem_gpu_ray_options options_;
 };
 
 class Query {
@@ -149,9 +148,9 @@ class Query {
   nb::tuple verdicts(nb::object instances, double tolerance, nb::object pairs, const GpuFilter* filter,
                      const Stream& stream);
 
-  /// probes: Points or Rays.
-  template <typename Probes>
-  Rows probe(nb::object instances, const Probes& probes, const Stream& stream);
+  /// Of: Points or Rays.
+  template <typename Of>
+  Rows probe(nb::object instances, const Of& probes, const Stream& stream);
 
   int device() const { return assets_.device(); }
   const Assets& assets() const { return assets_; }
@@ -228,11 +227,11 @@ class ProbeStep : QueuedCalls {
  public:
   ProbeStep(nb::object assets, std::uint32_t instances, std::uint32_t probes, std::uint32_t hits,
             std::uint32_t words);
-  /// Returns the room of the rows. probes: Points or Rays.
-  template <typename Probes>
+  /// Returns the room of the rows. Of, and `probes`: Points or Rays.
+  template <typename Of>
   Rows enqueue(nb::object instances, nb::object probes, const Stream& stream);
   Rows report() const;
-  /// As Step::wait().
+  /// Does what Step::wait() does.
   nb::tuple wait(const Stream* stream);
 
  private:

@@ -10,14 +10,13 @@
 #include "kernels/geometry/relative_pose.h"
 #include "kernels/refit/deformed_tree.h"
 #include "tandem/kernels/gpu_broad_phase.h"
-#include "tandem/kernels/gpu_closest_query.h"
 #include "tandem/kernels/gpu_containment_query.h"
 #include "tandem/kernels/gpu_deformer.h"
 #include "tandem/kernels/gpu_distance_query.h"
 #include "tandem/kernels/gpu_impact_query.h"
 #include "tandem/kernels/gpu_manifold_query.h"
 #include "tandem/kernels/gpu_moved_query.h"
-#include "tandem/kernels/gpu_ray_query.h"
+#include "tandem/kernels/gpu_probe_query.h"
 #include "tandem/kernels/gpu_tolerance_query.h"
 
 namespace tandem::test {
@@ -384,8 +383,7 @@ TEST_F(GpuDeformerTest, QuestionsThatTakeNoFloat64SayWhichAssetsMayHaveIt) {
     EXPECT_EQ(follow(GpuImpactQuery(), *of), refused);
     EXPECT_EQ(follow(GpuContactQuery(), *of), Status::kOk);
     EXPECT_EQ(follow(GpuDistanceQuery(), *of), Status::kOk);
-    EXPECT_EQ(follow(GpuClosestQuery(), *of), Status::kOk);
-    EXPECT_EQ(follow(GpuRayQuery(), *of), Status::kOk);
+    EXPECT_EQ(follow(GpuProbeQuery(), *of), Status::kOk);
   }
   const std::vector<double> now(3 * single.assets[0].source_vertices, 1.0 / 3);
   const std::vector<std::vector<double>> of_all = {now};

@@ -81,7 +81,6 @@ struct ContainmentQuery::State : Allocated {
 
 Status ContainmentQuery::State::name_surfaces(SceneState& scene) {
   if (assets_id == scene.assets_id && shapes_id == scene.shapes_id) return Status::kOk;
-  if (const Status status = scene.require_float32_corners(); status != Status::kOk) return status;
   const bool label_all = assets_id != scene.assets_id;
   assets_id = 0;
   surfaces.clear();
@@ -191,6 +190,7 @@ Status ContainmentQuery::ask(Scene& in, std::span<const ObjectPair> pairs, std::
   return ask_scene(in, [&](SceneState& scene) {
     const DeviceMemory* const on_device = query != nullptr ? query->on_device_of(scene) : nullptr;
     Status status = scene.require_topology();
+    if (status == Status::kOk) status = scene.require_float32_corners();
     if (status == Status::kOk) status = scene.take_pairs(pairs, pairs_);
     if (status != Status::kOk) return status;
     return on_device != nullptr ? scene.ask_device(*on_device, found()) : answer(scene, contacts);

@@ -19,9 +19,7 @@ Status status_of_open_error() {
 /// A regular file that is open for reading.
 class OpenFile {
  public:
-  explicit OpenFile(const char* path) {
-    status_ = open(path);
-  }
+  explicit OpenFile(const char* path) { status_ = open(path); }
   ~OpenFile() {
     if (file_ != INVALID_HANDLE_VALUE) CloseHandle(file_);
   }
@@ -44,16 +42,18 @@ class OpenFile {
     return status;
   }
 
-  // Others may read, replace and remove the file meanwhile. Folders are opened too, so that they are told from
-  // files that are refused.
+  // Others may read, replace and remove the file meanwhile. Folders are opened too, so that they are told
+  // from files that are refused.
   Status open(const wchar_t* path) {
     constexpr DWORD kShared = FILE_SHARE_READ | FILE_SHARE_WRITE | FILE_SHARE_DELETE;
-    file_ = CreateFileW(path, GENERIC_READ, kShared, nullptr, OPEN_EXISTING, FILE_FLAG_BACKUP_SEMANTICS, nullptr);
+    file_ =
+        CreateFileW(path, GENERIC_READ, kShared, nullptr, OPEN_EXISTING, FILE_FLAG_BACKUP_SEMANTICS, nullptr);
     if (file_ == INVALID_HANDLE_VALUE) return status_of_open_error();
     BY_HANDLE_FILE_INFORMATION info;
     LARGE_INTEGER size;
     const bool is_file = GetFileType(file_) == FILE_TYPE_DISK && GetFileInformationByHandle(file_, &info) &&
-                         (info.dwFileAttributes & FILE_ATTRIBUTE_DIRECTORY) == 0 && GetFileSizeEx(file_, &size);
+                         (info.dwFileAttributes & FILE_ATTRIBUTE_DIRECTORY) == 0 &&
+                         GetFileSizeEx(file_, &size);
     if (!is_file) return Status::kNotARegularFile;
     size_ = static_cast<std::size_t>(size.QuadPart);
     return Status::kOk;

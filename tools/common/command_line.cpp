@@ -176,6 +176,7 @@ void Command::end_help(const std::string& text) const {
 }
 
 Tool::Tool(const char* name, const char* help, const char* version) : Command(new CLI::App(help, name)) {
+  app_->allow_windows_style_options(false);  // an argument such as /tmp/cow.obj is a file
   app_->set_version_flag("--version", std::string(name) + " " + version);
   prepare_process(name);
 }

@@ -11,8 +11,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// The temporary file that Ctrl-C must remove; empty when there is none. Plain memory, because Windows calls the
-// handler on a thread of its own.
+// The temporary file that Ctrl-C must remove; empty when there is none. Plain memory, because Windows calls
+// the handler on a thread of its own.
 std::array<wchar_t, 32768> g_temporary{};
 
 BOOL WINAPI remove_temporary(DWORD) {
@@ -20,7 +20,8 @@ BOOL WINAPI remove_temporary(DWORD) {
   return FALSE;  // the next handler ends the process
 }
 
-// While it lives, Ctrl-C, Ctrl-Break, and the end of the console or the session remove the temporary file first.
+// While it lives, Ctrl-C, Ctrl-Break, and the end of the console or the session remove the temporary file
+// first.
 class EndGuard {
  public:
   explicit EndGuard(const std::wstring& temporary) {
@@ -52,7 +53,8 @@ DWORD write_and_close(HANDLE file, std::span<const std::byte> bytes, bool flush)
 
 HANDLE open_to_write(const fs::path& path, DWORD how) {
   // Shared for removal, so that the handler may remove what is still being written.
-  return CreateFileW(path.c_str(), GENERIC_WRITE, FILE_SHARE_DELETE, nullptr, how, FILE_ATTRIBUTE_NORMAL, nullptr);
+  return CreateFileW(path.c_str(), GENERIC_WRITE, FILE_SHARE_DELETE, nullptr, how, FILE_ATTRIBUTE_NORMAL,
+                     nullptr);
 }
 
 std::string words_of(DWORD error) {
@@ -83,7 +85,8 @@ std::string write_and_rename(const fs::path& target, std::span<const std::byte> 
   const EndGuard guard(temporary.native());
   DWORD error = write_and_close(open_to_write(temporary, CREATE_NEW), bytes, replace);
   constexpr DWORD kHow = MOVEFILE_REPLACE_EXISTING | MOVEFILE_WRITE_THROUGH;
-  if (error == NO_ERROR && replace && !MoveFileExW(temporary.c_str(), target.c_str(), kHow)) error = GetLastError();
+  if (error == NO_ERROR && replace && !MoveFileExW(temporary.c_str(), target.c_str(), kHow))
+    error = GetLastError();
   if (error != NO_ERROR || !replace) DeleteFileW(temporary.c_str());
   return words_of(error);
 }

@@ -3,8 +3,8 @@
 #include <string>
 #include <string_view>
 
-/// Paths as text: UTF-8 on Windows, elsewhere the bytes as they are. (There, path::string() and paths made of strings go by
-/// the character set of the C library.)
+/// Paths as text: UTF-8 on Windows, elsewhere the bytes as they are. (There, path::string() and paths made of
+/// strings go by the character set of the C library.)
 namespace tandem {
 
 inline std::filesystem::path path_of(std::string_view text) {

@@ -42,7 +42,8 @@ std::uint64_t peak_memory_bytes() {
 bool has_terminal() {
   const HANDLE terminal = GetStdHandle(STD_ERROR_HANDLE);
   DWORD mode = 0;
-  return GetConsoleMode(terminal, &mode) && SetConsoleMode(terminal, mode | ENABLE_VIRTUAL_TERMINAL_PROCESSING);
+  return GetConsoleMode(terminal, &mode) &&
+         SetConsoleMode(terminal, mode | ENABLE_VIRTUAL_TERMINAL_PROCESSING);
 }
 
 }  // namespace tandem

@@ -19,8 +19,8 @@ struct OpenedFile {
   std::pair<std::uint64_t, std::uint64_t> identity{};  ///< the disk, and the file's number there
 };
 
-/// Opens for reading, without waiting for the writer of a pipe. The handle is to be closed also where there is an
-/// error.
+/// Opens for reading, without waiting for the writer of a pipe. The handle is to be closed also where there
+/// is an error.
 std::error_code open_to_read(const std::filesystem::path& path, OpenedFile& file);
 
 /// Reads `count` bytes from `offset` on, fewer at the file's end. Result: their number.

@@ -28,7 +28,8 @@ FileKind kind_of(const OpenedFile& file, DWORD attributes) {
 
 std::error_code open_to_read(const std::filesystem::path& path, OpenedFile& file) {
   constexpr DWORD kShared = FILE_SHARE_READ | FILE_SHARE_WRITE | FILE_SHARE_DELETE;
-  // With FILE_FLAG_BACKUP_SEMANTICS folders are opened too, so that they are told from files that are refused.
+  // With FILE_FLAG_BACKUP_SEMANTICS folders are opened too, so that they are told from files that are
+  // refused.
   const HANDLE opened = CreateFileW(path.c_str(), GENERIC_READ, kShared, nullptr, OPEN_EXISTING,
                                     FILE_FLAG_BACKUP_SEMANTICS, nullptr);
   file.handle = reinterpret_cast<std::intptr_t>(opened);

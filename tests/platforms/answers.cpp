@@ -1,7 +1,6 @@
-// Prints a line for each question about a heap of bodies: how many rows there are, and a hash of their bytes. The same files give the
-// same lines on every platform; only times of impact and worlds, which take sines of the C library, may differ in
-// the last bits.
-// Usage: answers FILE.bvh...
+// Prints a line for each question about a heap of bodies: how many rows there are, and a hash of their bytes.
+// The same files give the same lines on every platform; only times of impact and worlds, which take sines of
+// the C library, may differ in the last bits. Usage: answers FILE.bvh...
 #include <tandem/tandem.h>
 
 #include <cmath>

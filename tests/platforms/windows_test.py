@@ -111,7 +111,6 @@ class Answers(Folder):
             self.assertEqual(native(BVHBUILD, SOURCE_DIR / f"assets/{mesh}.obj", "-o", files[-1], "--quiet").returncode, 0)
         ours, theirs = native(ANSWERS, *files), windows(ANSWERS, *files)
         self.assertEqual((ours.returncode, theirs.returncode), (0, 0), ours.stdout + theirs.stdout)
-        print(ours.stdout, theirs.stdout, sep="\n")
         self.assertEqual(self.without_sines(theirs.stdout), self.without_sines(ours.stdout))
         self.assertGreater(ours.stdout.count("contacts"), 2)
 

@@ -2,6 +2,18 @@ include(GNUInstallDirs)
 # Components of the installation: dev, but for shared libraries (libs, cuda), commands (tools) and the Python package (python).
 set(CMAKE_INSTALL_DEFAULT_COMPONENT_NAME dev)
 
+# What a system does in its own way is in a file for each kind of system: file_bytes_posix.cpp, file_bytes_windows.cpp.
+set(TANDEM_PLATFORM posix)
+if(WIN32)
+  set(TANDEM_PLATFORM windows)
+endif()
+
+# tandem_of_platform(file_bytes sources): adds the file of this system. Unity builds leave it alone: windows.h makes macros of common words.
+macro(tandem_of_platform name list)
+  list(APPEND ${list} ${name}_${TANDEM_PLATFORM}.cpp)
+  set_source_files_properties(${name}_${TANDEM_PLATFORM}.cpp PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
+endmacro()
+
 # Compiles what follows in this folder with -O1 where TANDEM_ONLY_TESTED says that only tests run it. Not for what cost_test counts: of
 # a template that two sources instantiate, the linker may choose either copy.
 macro(tandem_compile_fast_for_tests)

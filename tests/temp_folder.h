@@ -1,9 +1,9 @@
 #pragma once
 #include <gtest/gtest.h>
-#include <stdlib.h>
 
 #include <filesystem>
 #include <fstream>
+#include <random>
 #include <string>
 #include <string_view>
 
@@ -13,9 +13,10 @@ namespace tandem::test {
 class TempFolder {
  public:
   TempFolder() {
-    std::string name = (std::filesystem::path(testing::TempDir()) / "tandem test XXXXXX").string();
-    if (mkdtemp(name.data()) != nullptr) path_ = name;
-    EXPECT_FALSE(path_.empty());
+    std::random_device random;
+    do {
+      path_ = std::filesystem::path(testing::TempDir()) / ("tandem test " + std::to_string(random()));
+    } while (!std::filesystem::create_directory(path_));
   }
   ~TempFolder() { std::filesystem::remove_all(path_); }
   TempFolder(const TempFolder&) = delete;

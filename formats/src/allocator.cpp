@@ -2,6 +2,11 @@
 
 #include <cstdint>
 #include <cstdlib>
+#include <new>
+
+#if defined(_WIN32)  // its C library has functions of its own for aligned memory
+#include <malloc.h>
+#endif
 
 namespace tandem {
 namespace {
@@ -13,6 +18,15 @@ struct Origin {
 };
 static_assert(sizeof(Origin) <= kMemoryAlignment);
 
+#if defined(_WIN32)
+void* from_c_library(void*, std::size_t bytes, std::size_t alignment) {
+  return _aligned_malloc(bytes, alignment);
+}
+
+void to_c_library(void*, void* memory, std::size_t, std::size_t) {
+  _aligned_free(memory);
+}
+#else
 void* from_c_library(void*, std::size_t bytes, std::size_t alignment) {
   return std::aligned_alloc(alignment, bytes);
 }
@@ -20,6 +34,7 @@ void* from_c_library(void*, std::size_t bytes, std::size_t alignment) {
 void to_c_library(void*, void* memory, std::size_t, std::size_t) {
   std::free(memory);
 }
+#endif
 
 constexpr Allocator kCLibrary = {nullptr, from_c_library, to_c_library};
 

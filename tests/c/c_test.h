@@ -1,12 +1,28 @@
 /// The C programs here share these checks, and the mesh of an OBJ file. C99.
 #ifndef TANDEM_TESTS_C_TEST_H
 #define TANDEM_TESTS_C_TEST_H
+#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <tandem/tandem.h>
 
 static int failures = 0;
+
+/// Returns memory that free_aligned() gives back, or null. alignment: a power of two.
+static inline void* allocate_aligned(size_t bytes, size_t alignment) {
+  if (alignment < sizeof(void*)) alignment = sizeof(void*);
+  char* const memory = (char*)malloc(bytes + alignment + sizeof(void*));
+  if (memory == NULL) return NULL;
+  char* const first = memory + sizeof(void*) + alignment - 1;
+  void** const place = (void**)(void*)(first - (uintptr_t)first % alignment);
+  place[-1] = memory;
+  return place;
+}
+
+static inline void free_aligned(void* memory) {
+  if (memory != NULL) free(((void**)memory)[-1]);
+}
 
 #define CHECK(condition)                                                   \
   do {                                                                     \

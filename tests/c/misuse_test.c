@@ -1,22 +1,20 @@
 // Tests what the C interface answers to calls that are wrong. C99. Usage: misuse_test ASSETS_FOLDER
-#define _POSIX_C_SOURCE 200112L
 #include "c_test.h"
 
 // Grants some allocations, then none.
 static int grants_left;
 
 static void* grant(void* user, size_t bytes, size_t alignment) {
-  void* memory = NULL;
   (void)user;
   if (grants_left-- <= 0) return NULL;
-  return posix_memalign(&memory, alignment, bytes) == 0 ? memory : NULL;
+  return allocate_aligned(bytes, alignment);
 }
 
 static void give_back(void* user, void* memory, size_t bytes, size_t alignment) {
   (void)user;
   (void)bytes;
   (void)alignment;
-  free(memory);
+  free_aligned(memory);
 }
 
 // Null for a scene, and for what there must be.

@@ -22,8 +22,8 @@ static pthread_mutex_t counting = PTHREAD_MUTEX_INITIALIZER;
 
 static void* counted_allocate(void* user, size_t bytes, size_t alignment) {
   Counted* counted = (Counted*)user;
-  void* memory = NULL;
-  if (posix_memalign(&memory, alignment < sizeof(void*) ? sizeof(void*) : alignment, bytes) != 0) return NULL;
+  void* memory = allocate_aligned(bytes, alignment);
+  if (memory == NULL) return NULL;
   pthread_mutex_lock(&counting);
   ++counted->blocks;
   ++counted->ever;
@@ -35,7 +35,7 @@ static void* counted_allocate(void* user, size_t bytes, size_t alignment) {
 static void counted_deallocate(void* user, void* memory, size_t bytes, size_t alignment) {
   Counted* counted = (Counted*)user;
   (void)alignment;
-  free(memory);
+  free_aligned(memory);
   pthread_mutex_lock(&counting);
   --counted->blocks;
   counted->bytes -= bytes;
@@ -75,8 +75,8 @@ static void test_assets(void) {
   FILE* file = fopen(path, "wb");
   CHECK(file != NULL && fwrite(data, 1, bytes, file) == bytes && fclose(file) == 0);
 
-  void* aligned = NULL;
-  CHECK(posix_memalign(&aligned, 128, bytes) == 0);
+  void* aligned = allocate_aligned(bytes, 128);
+  CHECK(aligned != NULL);
   memcpy(aligned, data, bytes);
   tandem_asset* all[5] = {built, NULL, NULL, NULL, NULL};
   int one = 1;
@@ -135,7 +135,7 @@ static void test_assets(void) {
                TANDEM_CONTENT_CHANGED);
   CHECK(none == NULL && releases == 1);
   CHECK_STATUS(tandem_asset_open("/nowhere/cow.bvh", NULL, NULL, &none, &where), TANDEM_FILE_NOT_FOUND);
-  free(aligned);
+  free_aligned(aligned);
 }
 
 static uint32_t end_soon(void* user, double share) {

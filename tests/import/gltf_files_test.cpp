@@ -1,6 +1,8 @@
 // Tests what a glTF file is made of: JSON, containers, buffers.
 #include <gtest/gtest.h>
+#if !defined(_WIN32)
 #include <sys/stat.h>
+#endif
 
 #include <algorithm>
 #include <cstdint>
@@ -119,9 +121,11 @@ TEST_F(GltfFile, NamesBuffersThatAreNotThere) {
   EXPECT_EQ(error(file), "buffers[0] 'wheel': 'wheel.bin': no such file");
   write("wheel.bin", "short");
   EXPECT_EQ(error(file), "buffers[0] 'wheel': 'wheel.bin': holds 5 bytes, 54 are needed");
+#if !defined(_WIN32)
   ASSERT_EQ(mkfifo((folder_ / "pipe.bin").c_str(), 0600), 0);
   file.buffers = R"({"byteLength": 54, "uri": "pipe.bin"})";
   EXPECT_EQ(error(file), "buffers[0]: 'pipe.bin': is not a regular file");
+#endif
   file.buffers = R"({"byteLength": 54, "uri": "https://example.org/wheel.bin"})";
   expect_error(file, "is not a file beside the glTF");
   file.buffers = R"({"byteLength": 54, "uri": "data:text/html,AAAA"})";
@@ -139,7 +143,9 @@ TEST_F(GltfFile, ReadsBuffersInItsFolderAndBelowAlone) {
   const std::string bytes = kSquare + bytes_of<std::uint16_t>({0, 1, 2});
   write("outside.bin", bytes);
   write("scene/inside.bin", bytes);
-  fs::create_symlink("../outside.bin", folder_ / "scene/link.bin");
+  std::error_code no_links;
+  fs::create_symlink("../outside.bin", folder_ / "scene/link.bin", no_links);
+  if (no_links) GTEST_SKIP() << "no symbolic links here";
   fs::create_symlink("..", folder_ / "scene/up");
   fs::create_symlink("../inside.bin", folder_ / "scene/below/link.bin");
   ReadLimits anywhere;
@@ -311,6 +317,9 @@ TEST_F(GltfFile, IsReadByTandemWhateverItsEndingSays) {
 }
 
 TEST_F(GltfFile, GoesToAssimpWhenAskedOrWhenOnlyAssimpMayKnow) {
+#if !defined(TANDEM_ASSIMP)
+  GTEST_SKIP() << "built without assimp";
+#endif
   ImportOptions options;
   options.reader = Reader::assimp;
   const ImportResult asked = import_mesh(write("a.glb", square_glb()), options);

@@ -5,6 +5,7 @@
 
 #include "bvhbuild/import/animation.h"
 #include "common/number_words.h"
+#include "common/path_text.h"
 #include "tandem/formats/box.h"
 
 namespace tandem::build {
@@ -78,14 +79,14 @@ SampledImport import_poses(const Options& options) {
   PolygonMesh& mesh = import.read.mesh;
   import.names = {"rest"};
   for (const std::string& name : options.poses) {
-    const std::filesystem::path file = name;
+    const std::filesystem::path file = path_of(name);
     ImportResult pose = import_mesh(file, options.import);
     if (!pose.ok) return refuse(import, file, pose.error);
-    std::string defect = mesh_difference(mesh, pose.mesh, options.input.filename().string());
+    std::string defect = mesh_difference(mesh, pose.mesh, text_of(options.input.filename()));
     if (defect.empty()) defect = pose_defect(pose.mesh.points);
     if (!defect.empty()) return refuse(import, file, defect);
     mesh.poses.push_back(std::move(pose.mesh.points));
-    import.names.push_back(file.filename().string());
+    import.names.push_back(text_of(file.filename()));
     import.pose_files.push_back(file);
     import.read.files.insert(import.read.files.end(), pose.files.begin(), pose.files.end());
     import.read.files.push_back(name);

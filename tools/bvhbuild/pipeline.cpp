@@ -1,14 +1,11 @@
 #include "pipeline.h"
 
-#include <fcntl.h>
-#include <sys/mman.h>
-#include <sys/stat.h>
-#include <unistd.h>
-
+#include "bvhbuild/import/input_file.h"
 #include "bvhbuild/meshing/meshing.h"
 #include "common/json.h"
 #include "common/number_words.h"
 #include "common/output_file.h"
+#include "common/path_text.h"
 #include "common/printable.h"
 #include "import_samples.h"
 #include "kernels/common/stopwatch.h"
@@ -24,7 +21,7 @@ namespace fs = std::filesystem;
 
 Outcome& fail(Outcome& outcome, ExitCode code, const fs::path& file, const std::string& reason) {
   outcome.exit_code = code;
-  outcome.error = file.string() + ": " + reason;
+  outcome.error = text_of(file) + ": " + reason;
   return outcome;
 }
 
@@ -35,7 +32,7 @@ std::string output_defect(const Options& options, ExitCode& code) {
   if (fs::equivalent(options.input, options.output, error)) return "is the input; it would be overwritten";
   code = kUnwritableOutput;
   const fs::path folder = options.output.has_parent_path() ? options.output.parent_path() : ".";
-  if (!fs::exists(folder, error)) return "there is no folder " + folder.string();
+  if (!fs::exists(folder, error)) return "there is no folder " + text_of(folder);
   if (fs::is_directory(options.output, error)) return "is a folder";
   return {};
 }
@@ -74,20 +71,9 @@ std::string why_no_triangle(const Outcome& outcome, const LeftOut& left_out) {
 }
 
 InputDigest digest_of(const std::filesystem::path& path) {
-  const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
-  if (file < 0) return {};
-  InputDigest digest;
-  struct stat info {};
-  if (::fstat(file, &info) == 0 && S_ISREG(info.st_mode) && info.st_size > 0) {
-    const auto bytes = static_cast<std::size_t>(info.st_size);
-    void* data = ::mmap(nullptr, bytes, PROT_READ, MAP_PRIVATE, file, 0);
-    if (data != MAP_FAILED) {
-      digest = {bytes, xxh64(data, bytes)};
-      ::munmap(data, bytes);
-    }
-  }
-  ::close(file);
-  return digest;
+  InputFile file;
+  if (!file.open(path).empty() || !file.read_all().empty()) return {};
+  return {file.bytes().size(), xxh64(file.bytes().data(), file.bytes().size())};
 }
 
 // Adds what the provenance says of the samples that the tree was made for.
@@ -95,7 +81,7 @@ void add_samples(const Options& options, const Outcome& outcome, Json& json) {
   if (outcome.samples.empty()) return;
   json["samples"] = samples_json(outcome.samples);
   for (std::size_t i = 0; i < outcome.poses.size(); ++i) {
-    json["input"]["poses"].push_back({{"file", fs::path(options.poses[i]).filename().string()},
+    json["input"]["poses"].push_back({{"file", text_of(path_of(options.poses[i]).filename())},
                                       {"bytes", outcome.poses[i].bytes},
                                       {"xxh64", hexadecimal(outcome.poses[i].hash)}});
   }
@@ -122,7 +108,7 @@ std::string provenance_json(const Options& options, const Outcome& outcome) {
   Json json = {{"tool", "bvhbuild"},
                {"version", TANDEM_VERSION},
                {"input",
-                {{"file", options.input.filename().string()},
+                {{"file", text_of(options.input.filename())},
                  {"bytes", outcome.input.bytes},
                  {"xxh64", hexadecimal(outcome.input.hash)},
                  {"reader", outcome.reader},
@@ -177,7 +163,7 @@ Outcome run_pipeline(const Options& options) {
     return fail(outcome, outcome.exit_code, options.output, defect);
   }
   outcome.exit_code = kDone;
-  Progress progress(!options.quiet, printable(options.input.filename().string()));
+  Progress progress(!options.quiet, printable(text_of(options.input.filename())));
 
   progress.step("import");
   Stopwatch stopwatch;
@@ -188,7 +174,7 @@ Outcome run_pipeline(const Options& options) {
   if (!imported.read.ok) return fail(outcome, kUnreadableInput, imported.refused, imported.read.error);
   for (const std::string& file : imported.read.files) {
     std::error_code missing;  // then nothing can be overwritten
-    if (fs::equivalent(file, options.output, missing))
+    if (fs::equivalent(path_of(file), options.output, missing))
       return fail(outcome, kUsage, options.output, "is read too; it would be overwritten");
   }
   PolygonMesh& polygons = imported.read.mesh;

@@ -1,19 +1,13 @@
 #include "report.h"
 
-#include <sys/resource.h>
-
 #include "common/number_words.h"
+#include "common/path_text.h"
 #include "common/printable.h"
+#include "common/process.h"
 #include "statistics/statistics_json.h"
 
 namespace tandem::build {
 namespace {
-
-std::uint64_t peak_memory_bytes() {
-  struct rusage usage {};
-  ::getrusage(RUSAGE_SELF, &usage);
-  return static_cast<std::uint64_t>(usage.ru_maxrss) * 1024;
-}
 
 std::string rounding_words(const Outcome& outcome) {
   std::string words = outcome.rounding_error == 0
@@ -124,11 +118,11 @@ std::string seconds_words(const Options& options, const Outcome::Seconds& s) {
 
 void add_text(const Options& options, const Outcome& outcome, Report& report) {
   const TreeStatistics& tree = outcome.tree;
-  report.line(printable(options.output.string()) + ": " + number_of(tree.triangles, "triangle", "triangles") +
+  report.line(printable(text_of(options.output)) + ": " + number_of(tree.triangles, "triangle", "triangles") +
               " in " + number_of(tree.leaf_blocks + tree.internal_blocks, "block", "blocks") + ", " +
               human_bytes(outcome.file_bytes));
   report.row("read", with_commas(outcome.clean.faces) + " faces, " + with_commas(outcome.clean.vertices) +
-                         " vertices from " + printable(options.input.filename().string()) + " (" +
+                         " vertices from " + printable(text_of(options.input.filename())) + " (" +
                          outcome.reader + ")");
   for (const std::string& remark : outcome.remarks) report.row("note", remark);
   for (const Finding& finding : findings(outcome.clean)) {
@@ -155,8 +149,8 @@ Report report_of(const Options& options, const Outcome& outcome) {
               {"version", TANDEM_VERSION},
               {"exit_code", static_cast<int>(outcome.exit_code)},
               {"error", or_null(outcome.error)},
-              {"input", options.input.string()},
-              {"output", options.output.string()},
+              {"input", text_of(options.input)},
+              {"output", text_of(options.output)},
               {"reader", outcome.reader},
               {"single_precision_reader", outcome.single_precision},
               {"faces", outcome.clean.faces},

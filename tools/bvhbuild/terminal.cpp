@@ -1,14 +1,15 @@
 #include "terminal.h"
 
-#include <unistd.h>
-
+#include <csignal>
 #include <cstdio>
 #include <utility>
+
+#include "common/process.h"
 
 namespace tandem::build {
 
 Progress::Progress(bool wanted, std::string what)
-    : shown_(wanted && ::isatty(STDERR_FILENO) == 1), what_(std::move(what)) {}
+    : shown_(wanted && has_terminal()), what_(std::move(what)) {}
 
 void Progress::step(const char* name) {
   ++step_;
@@ -39,17 +40,18 @@ static_assert(std::atomic<bool>::is_always_lock_free, "a signal handler may touc
 }  // namespace
 
 StopOnInterrupt::StopOnInterrupt(std::atomic<bool>* flag) {
-  if (flag == nullptr || ::sigaction(SIGINT, nullptr, &before_) != 0) return;
-  if (before_.sa_handler == SIG_IGN) return;  // as for a job in the background of a shell
+  if (flag == nullptr) return;
   flag_to_set = flag;
-  struct sigaction stop {};
-  stop.sa_handler = [](int) { flag_to_set->store(true); };
-  stop.sa_flags = static_cast<int>(SA_RESETHAND | SA_RESTART);
-  installed_ = ::sigaction(SIGINT, &stop, nullptr) == 0;
+  before_ = std::signal(SIGINT, [](int) {
+    std::signal(SIGINT, SIG_DFL);
+    flag_to_set->store(true);
+  });
+  if (before_ == SIG_IGN) std::signal(SIGINT, SIG_IGN);  // as for a job in the background of a shell
+  installed_ = before_ != SIG_ERR;
 }
 
 StopOnInterrupt::~StopOnInterrupt() {
-  if (installed_) ::sigaction(SIGINT, &before_, nullptr);
+  if (installed_) std::signal(SIGINT, before_);
 }
 
 }  // namespace tandem::build

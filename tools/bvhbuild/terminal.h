@@ -1,6 +1,4 @@
 #pragma once
-#include <signal.h>
-
 #include <atomic>
 #include <string>
 
@@ -41,7 +39,7 @@ class StopOnInterrupt {
   StopOnInterrupt& operator=(const StopOnInterrupt&) = delete;
 
  private:
-  struct sigaction before_ {};
+  void (*before_)(int) = nullptr;  ///< what SIGINT did
   bool installed_ = false;
 };
 

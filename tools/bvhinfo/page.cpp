@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "common/number_words.h"
+#include "common/path_text.h"
 #include "common/printable.h"
 #include "levels/level_bytes.h"
 
@@ -337,7 +338,7 @@ std::string comparison(const std::vector<Inspection>& inspections) {
   std::string text = format("%-30s", "");
   for (const Inspection& inspection : inspections) {
     files.push_back(report_of(inspection).json());
-    const std::string name = std::filesystem::path(inspection.path).filename().string();
+    const std::string name = text_of(path_of(inspection.path).filename());
     text += format(" %24s", printable(name, name.size() > 24 ? 21 : 24).c_str());
   }
   text += "\n";

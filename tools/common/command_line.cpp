@@ -1,11 +1,8 @@
 #include "command_line.h"
 
-#include <unistd.h>
-
 #include <CLI/CLI.hpp>
 #include <array>
 #include <charconv>
-#include <csignal>
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
@@ -13,7 +10,9 @@
 #include <filesystem>
 
 #include "number_words.h"
+#include "path_text.h"
 #include "printable.h"
+#include "process.h"
 
 namespace tandem {
 namespace {
@@ -86,7 +85,6 @@ TANDEM_OPTION_OF(std::vector<std::string>);
 TANDEM_OPTION_OF(double);
 TANDEM_OPTION_OF(std::optional<double>);
 TANDEM_OPTION_OF(std::vector<double>);
-TANDEM_OPTION_OF(std::filesystem::path);
 TANDEM_OPTION_OF(std::array<double, 3>);
 TANDEM_OPTION_OF(std::optional<std::array<double, 3>>);
 TANDEM_OPTION_OF(std::uint32_t);
@@ -99,6 +97,12 @@ OptionRow::OptionRow(const char* name, std::function<void(const std::string&)> t
     : values_(std::move(values)), check_(std::move(check)) {
   add_ = [=](CLI::App& app) { return app.add_option_function<std::string>(name, take, help); };
 }
+
+OptionRow::OptionRow(const char* name, std::filesystem::path& path, std::string values, std::string help,
+                     Check check)
+    : OptionRow(
+          name, [&path](const std::string& text) { path = path_of(text); }, std::move(values),
+          std::move(help), std::move(check)) {}
 
 OptionRow::OptionRow(const char* name, bool& given, std::string help) {
   add_ = [=, &given](CLI::App& app) { return app.add_flag(name, given, help); };
@@ -171,23 +175,10 @@ void Command::end_help(const std::string& text) const {
   app_->footer(text);
 }
 
-namespace {
-
-char g_file_is_gone[128] = "";
-
-// A page of a mapped file cannot be read. What is called here may be called in a signal handler.
-[[noreturn]] void tell_that_a_file_is_gone(int) {
-  const ssize_t written = ::write(STDERR_FILENO, g_file_is_gone, std::strlen(g_file_is_gone));
-  ::_exit(written < 0 ? kInternal : kUnreadableInput);
-}
-
-}  // namespace
-
 Tool::Tool(const char* name, const char* help, const char* version) : Command(new CLI::App(help, name)) {
+  app_->allow_windows_style_options(false);  // an argument such as /tmp/cow.obj is a file
   app_->set_version_flag("--version", std::string(name) + " " + version);
-  std::snprintf(g_file_is_gone, sizeof g_file_is_gone,
-                "%s: a file was cut short, or its disk failed, while it was read\n", name);
-  std::signal(SIGBUS, tell_that_a_file_is_gone);
+  prepare_process(name);
 }
 
 Tool::~Tool() {
@@ -213,7 +204,7 @@ bool Tool::parse(int argc, char** argv, ExitCode& exit_code) const {
 void keep_inputs(const std::string& output, const std::vector<std::string>& inputs) {
   for (const std::string& input : inputs) {
     std::error_code missing;  // then nothing can be overwritten
-    if (std::filesystem::equivalent(output, input, missing)) {
+    if (std::filesystem::equivalent(path_of(output), path_of(input), missing)) {
       throw UsageError(output + ": would be overwritten, and is read too");
     }
   }

@@ -1,5 +1,6 @@
 #pragma once
 #include <algorithm>
+#include <filesystem>
 #include <functional>
 #include <initializer_list>
 #include <map>
@@ -63,6 +64,10 @@ class OptionRow {
       : OptionRow(
             name, [&names, &chosen](const std::string& word) { chosen = names.at(word); }, std::move(values),
             std::move(help), one_of(words_of(names))) {}
+
+  /// The path of a file.
+  OptionRow(const char* name, std::filesystem::path& path, std::string values, std::string help,
+            Check check = {});
 
   /// An option that `take` is given the text of.
   OptionRow(const char* name, std::function<void(const std::string&)> take, std::string values,
@@ -140,7 +145,7 @@ class Command {
 class Tool : public Command {
  public:
   /// version: what --version prints.
-  /// Effect: a mapped file that is cut short ends the process with a message and kUnreadableInput.
+  /// Effect: prepare_process().
   Tool(const char* name, const char* help, const char* version);
   ~Tool();
   Tool(const Tool&) = delete;

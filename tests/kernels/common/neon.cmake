@@ -18,7 +18,7 @@ function(hash_of result)
 endfunction()
 
 file(MAKE_DIRECTORY ${FOLDER})
-set(sources tests/kernels/common/variant_check.cpp formats/src/allocator.cpp formats/src/box.cpp kernels/common/available_memory.cpp
+set(sources tests/kernels/common/variant_check.cpp formats/src/allocator.cpp formats/src/box.cpp kernels/common/available_memory_linux.cpp
   kernels/common/available_memory_of_machine.cpp kernels/common/block_pair.cpp kernels/variants/lanes4.cpp
   kernels/contact/narrow_phase.cpp kernels/distance/nearest_phase.cpp kernels/manifold/single_pieces.cpp)
 list(TRANSFORM sources PREPEND ${SOURCE}/)

@@ -116,9 +116,11 @@ TEST_P(Scenes, HaveTheContactsOfExactArithmeticOnAllPairsOfTriangles) {
     sum.decided_exactly += query.counters().decided_exactly;
   });
   std::printf(
-      "%-12s %d scenes: %lu candidates, %lu contacts; decided by float32 %lu, float64 %lu, exactly %lu\n",
-      GetParam().name, count, sum.candidates, sum.contacts, sum.decided_by_float32, sum.decided_by_float64,
-      sum.decided_exactly);
+      "%-12s %d scenes: %.0f candidates, %.0f contacts; decided by float32 %.0f, float64 %.0f, exactly "
+      "%.0f\n",
+      GetParam().name, count, static_cast<double>(sum.candidates), static_cast<double>(sum.contacts),
+      static_cast<double>(sum.decided_by_float32), static_cast<double>(sum.decided_by_float64),
+      static_cast<double>(sum.decided_exactly));
   EXPECT_GT(sum.contacts, static_cast<std::uint64_t>(count));
 }
 

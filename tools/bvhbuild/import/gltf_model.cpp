@@ -6,6 +6,7 @@
 #include <cmath>
 #include <utility>
 
+#include "common/path_text.h"
 #include "common/printable.h"
 
 namespace tandem::build {
@@ -58,7 +59,7 @@ std::string read_file(const std::string& name, GltfBufferPlaces& places,
                       std::shared_ptr<const InputFile>& file) {
   const auto opened = std::make_shared<InputFile>();
   if (name.find('\0') != std::string::npos) return "no such file";
-  const std::filesystem::path path = places.folder / name;
+  const std::filesystem::path path = places.folder / path_of(name);
   std::string wrong = places.outside_files ? "" : why_not_beside(places.folder, path);
   if (wrong.empty()) wrong = opened->open(path);
   if (!wrong.empty()) return wrong;
@@ -68,7 +69,7 @@ std::string read_file(const std::string& name, GltfBufferPlaces& places,
     return "its bytes take more than the memory limit (--memory-limit)";
   places.most_bytes_in_files -= opened->size();
   places.files.emplace(opened->identity(), file = opened);
-  places.paths.push_back(path.string());
+  places.paths.push_back(text_of(path));
   return opened->read_all();
 }
 

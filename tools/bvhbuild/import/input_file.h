@@ -4,7 +4,8 @@
 #include <memory>
 #include <string>
 #include <string_view>
-#include <utility>
+
+#include "opened_file.h"
 
 namespace tandem::build {
 
@@ -24,11 +25,11 @@ class InputFile {
   /// denied", "the file is empty", ...
   std::string open(const std::filesystem::path& path);
 
-  std::uint64_t size() const { return size_; }
+  std::uint64_t size() const { return file_.size; }
 
   /// Equal for two open files exactly where they are the same file, whatever their names.
-  using Identity = std::pair<std::uint64_t, std::uint64_t>;
-  Identity identity() const { return identity_; }
+  using Identity = decltype(OpenedFile::identity);
+  Identity identity() const { return file_.identity; }
 
   /// The first bytes, at most 64. Empty when they cannot be read.
   std::string head() const;
@@ -42,9 +43,7 @@ class InputFile {
   std::string_view bytes() const { return {bytes_.get(), bytes_read_}; }
 
  private:
-  int descriptor_ = -1;
-  std::uint64_t size_ = 0;
-  Identity identity_{};  ///< device and inode
+  OpenedFile file_;
   std::unique_ptr<char[]> bytes_;
   std::size_t bytes_read_ = 0;
 };

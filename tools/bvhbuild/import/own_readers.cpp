@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "common/path_text.h"
 #include "readers.h"
 
 namespace tandem::build {
@@ -9,7 +10,7 @@ namespace {
 
 /// The file's ending in lower case, with its dot.
 std::string lower_extension(const std::filesystem::path& path) {
-  std::string extension = path.extension().string();
+  std::string extension = text_of(path.extension());
   for (char& c : extension)
     if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
   return extension;

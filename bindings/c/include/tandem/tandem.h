@@ -28,7 +28,9 @@
 #define TANDEM_VERSION_MINOR 1
 #define TANDEM_VERSION_PATCH 0
 
-#if defined(__GNUC__)
+#if defined(_WIN32) && defined(TANDEM_BUILDS_LIBRARY)
+#define TANDEM_API __declspec(dllexport)
+#elif defined(__GNUC__) && !defined(_WIN32)
 #define TANDEM_API __attribute__((visibility("default")))
 #else
 #define TANDEM_API

@@ -67,9 +67,9 @@ TANDEM_HD inline double distance_between(const WorldBox& a, const WorldBox& b) {
 
 /// Returns whether along each axis no gap as computed is larger than `reach`; with 0, whether they meet.
 TANDEM_HD inline bool are_near(const WorldBox& a, const WorldBox& b, double reach) {
-  bool near = true;
-  for (int k = 0; k < 3; ++k) near = near && a.lo[k] - b.hi[k] <= reach && b.lo[k] - a.hi[k] <= reach;
-  return near;
+  bool meet = true;
+  for (int k = 0; k < 3; ++k) meet = meet && a.lo[k] - b.hi[k] <= reach && b.lo[k] - a.hi[k] <= reach;
+  return meet;
 }
 
 /// The box, larger by `margin` on each side, rounded outward, as far as queries take boxes.

@@ -31,15 +31,15 @@ TANDEM_HD inline bool is_narrow(const DistanceInterval& interval, const Distance
 /// Returns how near a pair must be to count beside an upper bound: nearer than this. What may touch counts,
 /// whatever the tolerance.
 ///
-/// Rounded up, since what does not count may be a lower bound: upper - near <= allowed_width(). Where the
-/// width is less than half of `upper`, that difference is exact (Sterbenz), so it tells whether `near` was
-/// rounded down. If it was, one or two units in the last place are added.
+/// Rounded up, since what does not count may be a lower bound: upper - it <= allowed_width(). Where the
+/// width is less than half of `upper`, that difference is exact (Sterbenz), so it tells whether the result
+/// was rounded down. If it was, one or two units in the last place are added.
 TANDEM_HD inline double nearness_below(const DistanceTolerance& tolerance, double upper) {
   constexpr double kLeast = 0x1p-1074;
   const double width = allowed_width(tolerance, upper);
-  double near = upper - width;
-  if (upper - near > width) near += near * 0x1p-52 + kLeast;
-  return near > kLeast ? near : kLeast;
+  double lower = upper - width;
+  if (upper - lower > width) lower += lower * 0x1p-52 + kLeast;
+  return lower > kLeast ? lower : kLeast;
 }
 
 /// Points of two triangles as sums of corners: weights are in [0, 1] and sum to 1, up to rounding.

@@ -1,6 +1,3 @@
-#include "tandem/kernels/detail/available_memory.h"
-
-#if defined(__linux__)
 #include <fcntl.h>
 #include <unistd.h>
 
@@ -8,6 +5,8 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+
+#include "tandem/kernels/detail/available_memory.h"
 
 namespace tandem {
 namespace {
@@ -114,15 +113,3 @@ std::uint64_t available_memory_under(const char* root) {
 }
 
 }  // namespace tandem
-
-#else
-
-namespace tandem {
-
-std::uint64_t available_memory_under(const char*) {
-  return UINT64_MAX;
-}
-
-}  // namespace tandem
-
-#endif

@@ -12,7 +12,6 @@ class Tandem(ConanFile):
     license = "MIT"
     description = "Exact triangle collision by tandem traversal of 4-ary blocked AABB trees"
     topics = "collision-detection", "geometry", "physics", "bvh"
-    package_type = "static-library"
     settings = "os", "arch", "compiler", "build_type"
 
     def layout(self):

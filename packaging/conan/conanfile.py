@@ -13,6 +13,7 @@ class Tandem(ConanFile):
     description = "Exact triangle collision by tandem traversal of 4-ary blocked AABB trees"
     topics = "collision-detection", "geometry", "physics", "bvh"
     settings = "os", "arch", "compiler", "build_type"
+    no_copy_source = True
 
     def layout(self):
         cmake_layout(self, src_folder="src")

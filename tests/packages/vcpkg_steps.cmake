@@ -21,6 +21,7 @@ endfunction()
 function(vcpkg_cmake_configure)
   cmake_parse_arguments(ARG "" "SOURCE_PATH" "OPTIONS" ${ARGN})
   must(${CMAKE_COMMAND} -G Ninja -S ${ARG_SOURCE_PATH} -B ${FOLDER}/build -DCMAKE_BUILD_TYPE=Debug -DBUILD_SHARED_LIBS=OFF
+    -DCMAKE_UNITY_BUILD=ON -DCMAKE_UNITY_BUILD_BATCH_SIZE=50  # compiled fast, since one question is asked
     -DCMAKE_INSTALL_PREFIX=${CURRENT_PACKAGES_DIR} -DCMAKE_INSTALL_LIBDIR=lib ${ARG_OPTIONS})
 endfunction()
 function(vcpkg_cmake_install)

@@ -22,4 +22,4 @@ class Consumer(ConanFile):
 
     def test(self):
         if can_run(self):
-            self.run(str(Path(self.cpp.build.bindir) / "build"), env="conanrun")
+            self.run(f'"{Path(self.build_folder) / self.cpp.build.bindir / "build"}"', env="conanrun")

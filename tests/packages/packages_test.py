@@ -20,7 +20,8 @@ FOLDER = BUILD / "packages-test"
 CMAKE = Path(os.environ["TANDEM_CMAKE"])
 PYTHON = os.environ.get("TANDEM_PACKAGE_PYTHON", "")  # of a virtual environment with tests/python/requirements.txt
 HAVE_CUDA = os.environ["TANDEM_HAVE_CUDA"] == "1"
-NAME = "tandem-0.1.0"
+VERSION = re.search(r"project\(tandem VERSION ([0-9.]+)", (SOURCE / "CMakeLists.txt").read_text(encoding="utf-8"))[1]
+NAME, PYTHON_NAME = f"tandem-{VERSION}", f"tandem_contacts-{VERSION}"
 OLDEST_GLIBC = (2, 36)  # Debian 12's; a wheel for manylinux_2_36 or older runs there
 
 
@@ -167,7 +168,7 @@ class WheelTest(unittest.TestCase):
         cls.sdist = next(archives.glob("*.tar.gz"))
         with tarfile.open(cls.sdist) as archive:
             archive.extractall(archives)
-        run(PYTHON, "-m", "pip", "wheel", "--no-build-isolation", "--no-deps", "--no-index", "--disable-pip-version-check", "-w", cls.wheels, archives / NAME,
+        run(PYTHON, "-m", "pip", "wheel", "--no-build-isolation", "--no-deps", "--no-index", "--disable-pip-version-check", "-w", cls.wheels, archives / PYTHON_NAME,
             env=os.environ | {"SKBUILD_CMAKE_BUILD_TYPE": "Debug"})
         cls.wheel = next(cls.wheels.glob("*.whl"))
 
@@ -191,7 +192,7 @@ class WheelTest(unittest.TestCase):
 
     def test_the_wheel_has_no_file_of_others(self):
         with zipfile.ZipFile(self.wheel) as archive:
-            self.assertEqual({name.partition("/")[0] for name in archive.namelist()}, {"tandem", f"{NAME}.dist-info"})
+            self.assertEqual({name.partition("/")[0] for name in archive.namelist()}, {"tandem", f"{PYTHON_NAME}.dist-info"})
 
     def test_an_environment_with_the_wheel_finds_contacts(self):
         venv = FOLDER / "venv"

@@ -7,7 +7,7 @@
     blocked = tandem.dask.check(scene, poses)
 
 No answer depends on the workers, their number or their order. Work of a worker that dies is done by another. What has no answer in the end is named. Dask shows
-the progress under tandem-read, tandem-build, tandem-contacts and tandem-check. Needs `pip install 'tandem[dask]'`.
+the progress under tandem-read, tandem-build, tandem-contacts and tandem-check. Needs `pip install 'tandem-contacts[dask]'`.
 """
 from __future__ import annotations
 

@@ -1,0 +1,8 @@
+vcpkg_download_distfile(archive URLS "@URL@" FILENAME tandem-@VERSION@.tar.xz SHA512 @SHA512@)
+vcpkg_extract_source_archive(source ARCHIVE ${archive})
+vcpkg_cmake_configure(SOURCE_PATH ${source} OPTIONS -DTANDEM_TOOLS=OFF -DTANDEM_TESTS=OFF -DTANDEM_CUDA=OFF -DTANDEM_PYTHON=OFF)
+vcpkg_cmake_install()
+vcpkg_cmake_config_fixup(CONFIG_PATH lib/cmake/tandem)
+vcpkg_fixup_pkgconfig()
+file(REMOVE_RECURSE ${CURRENT_PACKAGES_DIR}/debug/include ${CURRENT_PACKAGES_DIR}/debug/share)
+vcpkg_install_copyright(FILE_LIST ${source}/LICENSE)

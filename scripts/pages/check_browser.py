@@ -32,6 +32,7 @@ class Visits:
 
     def open(self, page, width, scheme):
         context = self.browser.new_context(viewport={"width": width, "height": 900}, color_scheme=scheme, reduced_motion="reduce")
+        context.set_default_timeout(120_000)
         tab = context.new_page()
         where = f"{page}, {width} pixels, {scheme}"
         tab.on("console", lambda message: self.defects.append(f"{where}: console: {message.text}") if message.type in ("error", "warning") else None)

@@ -15,9 +15,9 @@ KINDS = {"start": "index.html", "concepts": "concepts.html", "guide": "queries.h
          "command_line": "command_line.html", "charts": "charts.html", "comparison": "comparison.html", "tables": "results/gpu_tables.html", "decision": "decisions/trees.html",
          "proof": "oriented_box_test.html", "source": "source/docs/examples/soft_ball.py.html"}
 # {what is typed: the page and place that the list of results must hold}
-SEARCHES = {"ContactQuery": "contact_query.html#ContactQuery", "tandem_scene_find_contacts": "tandem.html#tandem_scene_find_contacts", "Scene.closest": "scenes.html#tandem.Scene.closest",
+SEARCHES = {"ContactQuery": "contact_query.html#ContactQuery", "tandem_scene_find_contacts": "tandem.html#tandem_scene_find_contacts", "bodies_at": "scenes.html#tandem.Scene.bodies_at",
             "set_assets": "scene.html#Scene.set_assets", "leave_out_rings": "contact_query.html#ContactOptions", "CollisionManager": "trimesh.html#tandem.trimesh.CollisionManager",
-            "levels auto": "command_line.html#bvhbuild", "imaginary node": "concepts.html#imaginary-node", "kNoTopology": "status.html#Status"}
+            "expansion-limit": "command_line.html#bvhbuild", "imaginary node": "concepts.html#imaginary-node", "kNoTopology": "status.html#Status"}
 FIRST = 5  # pages of the list in which it must be
 WIDTHS, SCHEMES = (390, 820, 1440), ("light", "dark")
 BAD = ("serious", "critical")

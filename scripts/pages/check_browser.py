@@ -20,6 +20,11 @@ SEARCHES = {"ContactQuery": "contact_query.html#ContactQuery", "tandem_scene_fin
             "expansion-limit": "command_line.html#bvhbuild", "imaginary node": "concepts.html#imaginary-node", "kNoTopology": "status.html#Status"}
 FIRST = 5  # pages of the list in which it must be
 WIDTHS, SCHEMES = (390, 820, 1440), ("light", "dark")
+# Shows all pictures, and returns those that cannot be shown.
+SHOW_PICTURES = """Promise.all([...document.images].map(image => {
+    image.loading = "eager";
+    return image.decode().then(() => null, () => image.src);
+})).then(all => all.filter(Boolean))"""
 BAD = ("serious", "critical")
 
 
@@ -47,8 +52,7 @@ class Visits:
         wide = tab.evaluate("document.documentElement.scrollWidth - innerWidth")
         if wide > 0:
             self.defects.append(f"{page}: is {wide} pixels wider than a screen of {width}")
-        self.defects += [f"{page}: a picture is not shown: {source}" for source in tab.evaluate(
-            "Promise.all([...document.images].map(image => { image.loading = 'eager'; return image.decode().then(() => null, () => image.src) })).then(all => all.filter(Boolean))")]
+        self.defects += [f"{page}: a picture is not shown: {source}" for source in tab.evaluate(SHOW_PICTURES)]
         for violation in self.axe.run(tab, options={"preload": False}).response["violations"]:
             if violation["impact"] in BAD:
                 places = [(node["target"], node["any"][0]["message"] if node["any"] else "") for node in violation["nodes"][:3]]
@@ -80,7 +84,7 @@ class Visits:
 
     def picture(self, name, page, width, scheme, folder):
         tab = self.open(page, width, scheme)
-        tab.wait_for_load_state("networkidle")
+        tab.evaluate(SHOW_PICTURES)
         tab.screenshot(path=folder / f"{name}_{width}_{scheme}.png", clip={"x": 0, "y": 0, "width": width, "height": 1800}, full_page=True)
         tab.context.close()
 

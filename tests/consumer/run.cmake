@@ -21,7 +21,7 @@ function(require_shown page language text)
 endfunction()
 
 file(READ ${SOURCE}/tests/consumer/main.cpp program)
-require_shown(README.md cpp "${program}")
+require_shown(docs/install.md cpp "${program}")
 file(READ ${SOURCE}/tests/consumer/contacts.cpp program)
 require_shown(docs/queries.md cpp "${program}")
 file(READ ${SOURCE}/tests/consumer/distances.cpp program)

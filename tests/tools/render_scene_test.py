@@ -149,6 +149,26 @@ class RenderedRuns(RenderTest):
         self.assertLess(np.abs(of_run - self.picture(self.scene, "--width", "160")).max(axis=2).mean(), 1e-3)
         self.assertGreater(np.abs(of_run - self.picture(run, "--width", "160")).max(axis=2).mean(), 1e-2)
 
+    def test_each_state_of_an_animation_has_its_own_contacts(self):
+        run, files = self.pile(), []
+        for frame in (0, 10, 20):
+            self.passes("frame", run, "--frame", str(frame), "-o", self.scene)
+            files.append(self.outputs / f"contacts_{frame}.h5")
+            self.passes("query", self.scene, "--out", files[-1])
+        of_run = self.picture(run, "--frame", "20", "--contacts", files[2], "--width", "160")
+        np.testing.assert_allclose(of_run, self.picture(self.scene, "--contacts", files[2], "--width", "160"), atol=0.02)
+        result, _ = self.render(run, "--frames", "0:20:10", "--contacts", *files[:2], name="run.gif")
+        self.assertEqual(result.returncode, 2)
+        self.assertIn(b"one file for each state", result.stderr)
+        try:
+            import PIL.Image
+        except ImportError:
+            self.skipTest("python3-pil is not here")
+        result, output = self.render(run, "--frames", "0:20:10", "--contacts", *files, "--width", "96", name="run.webp")
+        self.assertEqual((result.returncode, result.stderr), (DONE, b""))
+        with PIL.Image.open(output) as animation:
+            self.assertEqual((animation.n_frames, animation.size), (3, (96, 60)))
+
     def test_an_animation_shows_the_frames_in_real_time(self):
         try:
             import PIL.Image

@@ -32,6 +32,7 @@ std::vector<AssetView> views_of(const Files& files) {
 
 /// The assets of some files on the GPU, of which some deform.
 struct DeformingAssets {
+  Files own;  // where it was given them to keep
   std::vector<AssetView> views;
   DeviceAssets uploaded;
   std::vector<GpuAsset> assets;
@@ -54,6 +55,12 @@ struct DeformingAssets {
     EXPECT_EQ(list.set(assets, types, nullptr), Status::kOk);
     EXPECT_EQ(deformer.begin(assets, bodies, list.records(), nullptr), Status::kOk)
         << cudaGetErrorString(deformer.cuda_error());
+  }
+
+  DeformingAssets(Files&& files, std::vector<std::uint32_t> deforming, Contents contents = Contents::all,
+                  PositionTypes types = PositionTypes::float32)
+      : DeformingAssets(files, std::move(deforming), contents, types) {
+    own = std::move(files);
   }
 
   /// An empty list: the body stays as it is.

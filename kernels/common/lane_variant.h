@@ -14,6 +14,7 @@ struct ManifoldLanes;
 struct RefitTree;
 struct RayTask;
 struct RayStream;
+struct RayGroupWays;
 struct PointTask;
 
 /// The functions that are compiled once for each width of vectors.
@@ -26,6 +27,7 @@ struct LaneVariant {
   double (*refit)(const RefitTree&, const float*);
   void (*ray_walk)(RayTask&);
   void (*ray_stream_walk)(const RayStream&);
+  const RayGroupWays* ray_group_ways;
   void (*point_walk)(PointTask&);
 };
 

@@ -43,8 +43,8 @@ TANDEM_HD inline RayInFrame<Value> ray_in_frame(const LocalRay& ray) {
 /// the earliest.
 template <typename Value>
 TANDEM_HD inline auto misses_box(const RayInFrame<Value>& ray, const Value (&centre)[3],
-                                 const Value (&half_extent)[3], float limit, Value& first) {
-  Value last = Value{} + limit;
+                                 const Value (&half_extent)[3], const Value& limit, Value& first) {
+  Value last = limit;
   first = Value{};
   for (int k = 0; k < 3; ++k) {
     const Value m = (centre[k] - ray.o[k]) * ray.inverse[k];

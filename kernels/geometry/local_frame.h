@@ -60,6 +60,36 @@
 /// The bound as computed has 1.001 for its roundings, and 2^-70 for underflow: factors are below 2^33.
 namespace tandem {
 
+/// The functions that templates over Real call for one float64 number; ray_lanes.h has them for several.
+namespace float64 {
+
+TANDEM_HD inline bool less(double x, double y) {
+  return x < y;
+}
+TANDEM_HD inline bool at_most(double x, double y) {
+  return x <= y;
+}
+TANDEM_HD inline double select(bool mask, double x, double y) {
+  return mask ? x : y;
+}
+TANDEM_HD inline double magnitude(double x) {
+  return std::fabs(x);
+}
+TANDEM_HD inline float narrowed(double x) {
+  return static_cast<float>(x);
+}
+TANDEM_HD inline double widened(float x) {
+  return static_cast<double>(x);
+}
+
+/// The power of two that takes a positive float64 number to [1, 2), or subnormal ones to less.
+TANDEM_HD inline double scale_to_one(double x) {
+  const auto exponent = static_cast<int>(detail::bits_of(x) >> 52);
+  return detail::float64_of(static_cast<std::uint64_t>(2046 - (exponent > 1 ? exponent : 1)) << 52);
+}
+
+}  // namespace float64
+
 /// A body as points and rays see it.
 struct LocalFrame : FrameLengths {
   double inverse[3][3];  ///< N
@@ -107,7 +137,8 @@ TANDEM_HD inline LocalFrame local_frame(const Pose& pose, const TreeExtent& exte
 }
 
 /// N v.
-TANDEM_HD inline void take_image(const LocalFrame& frame, const double (&v)[3], double (&out)[3]) {
+template <typename Real>
+TANDEM_HD inline void take_image(const LocalFrame& frame, const Real (&v)[3], Real (&out)[3]) {
   for (int i = 0; i < 3; ++i)
     out[i] = (frame.inverse[i][0] * v[0] + frame.inverse[i][1] * v[1]) + frame.inverse[i][2] * v[2];
 }
@@ -143,19 +174,35 @@ TANDEM_HD inline bool local_point(const LocalFrame& frame, const double (&p)[3],
   return in_range;
 }
 
-/// A ray of the world, ready for bodies.
-struct WorldRay {
-  double origin[3], direction[3];
-  double scaled[3];   ///< the direction times `factor`
-  double inverse[3];  ///< 1 / scaled
-  double factor;      ///< a power of two; a parameter is one of the scaled ray times this
+/// A ray of the world, ready for bodies; Real: double, or a vector with a ray in each lane.
+template <typename Real>
+struct WorldRayOf {
+  Real origin[3], direction[3];
+  Real scaled[3];   ///< the direction times `factor`
+  Real inverse[3];  ///< 1 / scaled
+  Real factor;      ///< a power of two; a parameter is one of the scaled ray times this
   double reach;
 };
+using WorldRay = WorldRayOf<double>;
 
-/// The power of two that takes a positive float64 number to [1, 2), or subnormal ones to less.
-TANDEM_HD inline double scale_to_one(double x) {
-  const auto exponent = static_cast<int>(detail::bits_of(x) >> 52);
-  return detail::float64_of(static_cast<std::uint64_t>(2046 - (exponent > 1 ? exponent : 1)) << 52);
+/// Makes a ray ready that has an origin, a direction and a reach.
+template <typename Real>
+TANDEM_HD inline void make_ready(WorldRayOf<Real>& ray) {
+  using float64::at_most, float64::less, float64::magnitude, float64::scale_to_one, float64::select;
+  Real largest = 0.0;
+  for (int k = 0; k < 3; ++k) {
+    const Real size = magnitude(ray.direction[k]);
+    largest = select(less(largest, size), size, largest);
+  }
+  ray.factor = scale_to_one(largest);
+  for (int k = 0; k < 3; ++k) {
+    const Real along = ray.direction[k], scaled = along * ray.factor, size = magnitude(scaled);
+    // Only what is exactly 0 stays so.
+    const Real least = select(less(along, 0.0), Real(-0x1p-1000), Real(0x1p-1000));
+    const auto vanished = less(0.0, magnitude(along)) & at_most(size, 0.0);
+    ray.scaled[k] = select(vanished, least, scaled);
+    ray.inverse[k] = 1.0 / ray.scaled[k];
+  }
 }
 
 TANDEM_HD inline WorldRay world_ray(const double* origin, const double* direction, double reach) {
@@ -164,66 +211,87 @@ TANDEM_HD inline WorldRay world_ray(const double* origin, const double* directio
     ray.origin[k] = origin[k];
     ray.direction[k] = direction[k];
   }
-  ray.factor = scale_to_one(ray::largest_of(ray.direction));
-  for (int k = 0; k < 3; ++k) {
-    ray.scaled[k] = direction[k] * ray.factor;
-    // Only what is exactly 0 stays so.
-    if (ray.scaled[k] == 0 && direction[k] != 0) ray.scaled[k] = direction[k] > 0 ? 0x1p-1000 : -0x1p-1000;
-    ray.inverse[k] = 1 / ray.scaled[k];
-  }
   ray.reach = reach;
+  make_ready(ray);
   return ray;
 }
 
 /// Takes the part of a ray that an interval along an axis leaves, before rounding.
-TANDEM_HD inline void cut_to_slab(double origin, double inverse, double lo, double hi, double& near,
-                                  double& far) {
-  const double from = (lo - origin) * inverse, to = (hi - origin) * inverse;
-  const double less = from < to ? from : to, more = from < to ? to : from;
-  near = near < less ? less : near;
-  far = more < far ? more : far;
+template <typename Real>
+TANDEM_HD inline void cut_to_slab(const Real& origin, const Real& inverse, const Real& lo, const Real& hi,
+                                  Real& near, Real& far) {
+  using float64::less, float64::select;
+  const Real from = (lo - origin) * inverse, to = (hi - origin) * inverse;
+  const auto ascends = less(from, to);
+  const Real least = select(ascends, from, to), most = select(ascends, to, from);
+  near = select(less(near, least), least, near);
+  far = select(less(most, far), most, far);
 }
 
 /// Rounds the part outward. A bound along an axis has three roundings, and 2^-50 is spared; rounding keeps
 /// the order of numbers, so that the largest is rounded in place of each. Returns whether anything is left of
 /// first to last, which are made to be that.
-TANDEM_HD inline bool leaves_part(double near, double far, double& first, double& last) {
-  near = near * (near > 0 ? 1 - 0x1p-50 : 1 + 0x1p-50) - 0x1p-1000;
-  far = far * (far > 0 ? 1 + 0x1p-50 : 1 - 0x1p-50) + 0x1p-1000;
-  first = first < near ? near : first;
-  last = far < last ? far : last;
-  return first <= last;
+template <typename Real>
+TANDEM_HD inline auto leaves_part(const Real& near, const Real& far, Real& first, Real& last) {
+  using float64::at_most, float64::less, float64::select;
+  constexpr double kLess = 1 - 0x1p-50, kMore = 1 + 0x1p-50;
+  const Real from = near * select(less(0.0, near), Real(kLess), Real(kMore)) - 0x1p-1000;
+  const Real to = far * select(less(0.0, far), Real(kMore), Real(kLess)) + 0x1p-1000;
+  first = select(less(first, from), from, first);
+  last = select(less(to, last), to, last);
+  return at_most(first, last);
 }
 
 /// Returns whether a ray may meet a box: the parameters are bounds of the part of the scaled ray that does. A
 /// ray whose coordinate does not change along an axis is compared with the box there.
-TANDEM_HD inline bool meets_box(const WorldRay& ray, const double* lo, const double* hi, double& first,
-                                double& last) {
-  double near = -HUGE_VAL, far = HUGE_VAL;
+template <typename Real>
+TANDEM_HD inline auto meets_box(const WorldRayOf<Real>& ray, const double* lo, const double* hi, Real& first,
+                                Real& last) {
+  using float64::at_most, float64::less, float64::magnitude, float64::select;
+  Real near = -HUGE_VAL, far = HUGE_VAL;
+  auto beside = less(Real(0.0), 0.0);
   for (int k = 0; k < 3; ++k) {
-    if (std::fabs(ray.scaled[k]) < 0x1p-900) {
-      // Along the whole ray, up to 2^1000, it moves by less than 2^100.
-      if (ray.scaled[k] == 0 && !(lo[k] <= ray.origin[k] && ray.origin[k] <= hi[k])) return false;
-      continue;
-    }
-    cut_to_slab(ray.origin[k], ray.inverse[k], lo[k], hi[k], near, far);
+    Real from = near, to = far;
+    cut_to_slab<Real>(ray.origin[k], ray.inverse[k], lo[k], hi[k], from, to);
+    // Along the whole ray, up to 2^1000, it moves by less than 2^100.
+    const Real size = magnitude(ray.scaled[k]);
+    const auto moves = !less(size, 0x1p-900);
+    near = select(moves, from, near);
+    far = select(moves, to, far);
+    const auto rests = at_most(size, 0.0);
+    beside = beside | (rests & (less(ray.origin[k], lo[k]) | less(hi[k], ray.origin[k])));
   }
-  return leaves_part(near, far, first, last);
+  const auto enters = !beside;
+  return leaves_part(near, far, first, last) & enters;
 }
 
-/// A ray as float32 has it in a body's frame.
-struct LocalRay {
-  float o[3], d[3], inverse[3];
-  float slack;                     ///< of the box test, along every axis
-  float length;                    ///< tau_1 - tau_0, rounded up
-  float edge_factor, least_bound;  ///< of the triangle test: least_bound + edge_factor e
-  double start;                    ///< tau_0
+/// As many float32 numbers as a Real has float64 numbers.
+template <typename Real>
+struct SingleOf;
+template <>
+struct SingleOf<double> {
+  using Type = float;
 };
+
+/// A ray as float32 has it in a body's frame.
+template <typename Real>
+struct LocalRayOf {
+  using Single = typename SingleOf<Real>::Type;
+
+  Single o[3], d[3], inverse[3];
+  Single slack;                     ///< of the box test, along every axis
+  Single length;                    ///< tau_1 - tau_0, rounded up
+  Single edge_factor, least_bound;  ///< of the triangle test: least_bound + edge_factor e
+  Real start;                       ///< tau_0
+};
+using LocalRay = LocalRayOf<double>;
 
 enum class RayReach : std::uint8_t { misses, in_frame, out_of_range };
 
-TANDEM_HD inline float rounded_up(double x) {
-  return x < 0x1p120 ? static_cast<float>(x * (1 + 0x1p-22) + 0x1p-100) : INFINITY;
+template <typename Real>
+TANDEM_HD inline auto rounded_up(const Real& x) {
+  using float64::less, float64::narrowed, float64::select;
+  return narrowed(select(less(x, 0x1p120), x * (1 + 0x1p-22) + 0x1p-100, Real(HUGE_VAL)));
 }
 
 /// The parameter of the local ray that a parameter of the world's is at most.
@@ -235,50 +303,94 @@ TANDEM_HD inline float local_limit(const WorldRay& world, const LocalRay& ray, d
   return out < ray.length ? out : ray.length;
 }
 
+/// The part of a ray in a body's frame that may meet the body, in float64.
+template <typename Real>
+struct CutRay {
+  Real o[3], d[3];
+  Real o_error;  ///< of a coordinate of `o`
+  Real far;      ///< f
+  Real start, length;
+};
+
+TANDEM_HD inline double direction_error(const LocalFrame& frame) {
+  return 8.4 * 0x1p-53 * frame.row_sum + 0x1p-59;
+}
+
+/// Cuts a ray to a body whose frame is in range. last: the greatest parameter of the world's ray that counts.
+/// Returns whether anything is left; `in_range`: whether float64 can tell.
+template <typename Real, typename Mask>
+TANDEM_HD inline Mask cut_ray(const LocalFrame& frame, const WorldRayOf<Real>& world, const Real& last,
+                              CutRay<Real>& out, Mask& in_range) {
+  using float64::at_most, float64::less, float64::magnitude, float64::select;
+  Real v[3], largest = 0.0;
+  out.far = 0.0;
+  for (int k = 0; k < 3; ++k) {
+    v[k] = world.origin[k] - frame.translation[k];
+    const Real size = magnitude(v[k]), along = magnitude(world.scaled[k]);
+    out.far = select(less(out.far, size), size, out.far);
+    largest = select(less(largest, along), along, largest);
+  }
+  in_range = at_most(out.far, 0x1p200) & at_most(1.0, largest);
+  take_image(frame, v, out.o);
+  take_image(frame, world.scaled, out.d);
+  out.o_error = 4.2 * 0x1p-53 * frame.row_sum * out.far + 0x1p-990;
+  // The largest coordinate of d is above 1/2, so what is in the body's box has parameters below this.
+  const Real size = out.far + frame.most_reach, most = 8.0 * size;
+  const Real margin = 1.01 * (out.o_error + most * direction_error(frame)) + 0x1p-46 * size + 0x1p-100;
+  Real near = -HUGE_VAL, beyond = HUGE_VAL, end = last / world.factor;
+  end = select(less(end, most), end, most);
+  for (int k = 0; k < 3; ++k) {
+    Real& d = out.d[k];
+    const Real least = select(less(d, 0.0), Real(-0x1p-60), Real(0x1p-60));
+    d = select(less(magnitude(d), 0x1p-60), least, d);
+    cut_to_slab<Real>(out.o[k], 1.0 / d, frame.lower[k] - margin, frame.upper[k] + margin, near, beyond);
+  }
+  out.start = 0.0;
+  const Mask meets = leaves_part(near, beyond, out.start, end);
+  out.length = (end - out.start) * (1 + 0x1p-40) + 0x1p-60;
+  return meets;
+}
+
+/// Rounds a ray to float32. Returns whether float32 can take it.
+template <typename Real>
+TANDEM_HD inline auto round_ray(const LocalFrame& frame, const CutRay<Real>& cut, LocalRayOf<Real>& out) {
+  using float64::at_most, float64::less, float64::magnitude, float64::narrowed, float64::select,
+      float64::widened;
+  using Single = typename LocalRayOf<Real>::Single;
+  const double d_error = direction_error(frame);
+  Real largest_o = 0.0, largest_d = 0.0, d_1 = 0.0;
+  for (int k = 0; k < 3; ++k) {
+    out.o[k] = narrowed(cut.o[k] + cut.start * cut.d[k]);
+    out.d[k] = narrowed(cut.d[k]);
+    out.inverse[k] = (Single{} + 1.0f) / out.d[k];
+    const Real o_size = magnitude(widened(out.o[k])), d_size = magnitude(cut.d[k]);
+    largest_o = select(less(largest_o, o_size), o_size, largest_o);
+    largest_d = select(less(largest_d, d_size), d_size, largest_d);
+    d_1 = d_1 + d_size;
+  }
+  const Real a = 1.01 * 0x1p-24 * largest_o + (cut.o_error + cut.start * d_error) +
+                 0x1p-51 * frame.row_sum * (cut.far + 4.0 * cut.start) + 0x1p-120;
+  const Real b = 1.01 * 0x1p-24 * largest_d + d_error;
+  const Real off = frame.most_error + a, reach = frame.most_reach + largest_o;
+  out.slack = rounded_up(1.001 * (off + cut.length * b) + 4.3 * 0x1p-24 * reach + 0x1p-60);
+  out.edge_factor = rounded_up(1.001 * ((17 * 0x1p-24 * d_1 + 6.1 * b) * reach + 2.1 * d_1 * off));
+  out.least_bound = rounded_up(1.001 * 4.3 * d_1 * frame.most_error * (reach + off) + 0x1p-70);
+  out.length = rounded_up(cut.length);
+  out.start = cut.start;
+  constexpr double kLargest = kLargestInFrame;
+  return at_most(off, kLargest) & at_most(cut.length, kLargest);
+}
+
 /// last: the greatest parameter of the world's ray that counts.
 TANDEM_HD inline RayReach local_ray(const LocalFrame& frame, const WorldRay& world, double last,
                                     LocalRay& out) {
   if (!frame.in_range) return RayReach::out_of_range;
-  double v[3], o[3], d[3];
-  for (int k = 0; k < 3; ++k) v[k] = world.origin[k] - frame.translation[k];
-  const double far = ray::largest_of(v);
-  if (!(far <= 0x1p200 && ray::largest_of(world.scaled) >= 1)) return RayReach::out_of_range;
-  take_image(frame, v, o);
-  take_image(frame, world.scaled, d);
-  const double o_error = 4.2 * 0x1p-53 * frame.row_sum * far + 0x1p-990;
-  const double d_error = 8.4 * 0x1p-53 * frame.row_sum + 0x1p-59;
-  // The largest coordinate of d is above 1/2, so what is in the body's box has parameters below this.
-  const double size = far + frame.most_reach, most = 8 * size;
-  const double margin = 1.01 * (o_error + most * d_error) + 0x1p-46 * size + 0x1p-100;
-  double near = -HUGE_VAL, beyond = HUGE_VAL, start = 0, end = last / world.factor;
-  if (!(end <= most)) end = most;
-  for (int k = 0; k < 3; ++k) {
-    if (std::fabs(d[k]) < 0x1p-60) d[k] = d[k] < 0 ? -0x1p-60 : 0x1p-60;
-    cut_to_slab(o[k], 1 / d[k], frame.lower[k] - margin, frame.upper[k] + margin, near, beyond);
-  }
-  if (!leaves_part(near, beyond, start, end)) return RayReach::misses;
-  const double length = (end - start) * (1 + 0x1p-40) + 0x1p-60;
-  double largest_o = 0, largest_d = 0, d_1 = 0;
-  for (int k = 0; k < 3; ++k) {
-    out.o[k] = static_cast<float>(o[k] + start * d[k]);
-    out.d[k] = static_cast<float>(d[k]);
-    out.inverse[k] = 1 / out.d[k];
-    const double o_size = std::fabs(static_cast<double>(out.o[k])), d_size = std::fabs(d[k]);
-    largest_o = largest_o < o_size ? o_size : largest_o;
-    largest_d = largest_d < d_size ? d_size : largest_d;
-    d_1 += d_size;
-  }
-  const double a = 1.01 * 0x1p-24 * largest_o + (o_error + start * d_error) +
-                   0x1p-51 * frame.row_sum * (far + 4 * start) + 0x1p-120;
-  const double b = 1.01 * 0x1p-24 * largest_d + d_error;
-  const double off = frame.most_error + a, reach = frame.most_reach + largest_o;
-  if (!(off <= kLargestInFrame && length <= kLargestInFrame)) return RayReach::out_of_range;
-  out.slack = rounded_up(1.001 * (off + length * b) + 4.3 * 0x1p-24 * reach + 0x1p-60);
-  out.edge_factor = rounded_up(1.001 * ((17 * 0x1p-24 * d_1 + 6.1 * b) * reach + 2.1 * d_1 * off));
-  out.least_bound = rounded_up(1.001 * 4.3 * d_1 * frame.most_error * (reach + off) + 0x1p-70);
-  out.length = rounded_up(length);
-  out.start = start;
-  return RayReach::in_frame;
+  CutRay<double> cut;
+  bool in_range;
+  const bool meets = cut_ray(frame, world, last, cut, in_range);
+  if (!in_range) return RayReach::out_of_range;
+  if (!meets) return RayReach::misses;
+  return round_ray(frame, cut, out) ? RayReach::in_frame : RayReach::out_of_range;
 }
 
 }  // namespace tandem

@@ -1,5 +1,6 @@
 #pragma once
 #include <algorithm>
+#include <bit>
 
 #include "kernels/common/lanes.h"
 #include "kernels/common/traversal.h"
@@ -10,6 +11,12 @@
 // Included by files that are compiled for different machines: internal linkage, see lanes.h.
 namespace tandem {
 namespace {
+
+#ifdef TANDEM_HAVE_LANES
+#define TANDEM_ALWAYS_INLINE TANDEM_INLINE
+#else
+#define TANDEM_ALWAYS_INLINE inline
+#endif
 
 /// Four numbers, as a compiler without vectors has them.
 struct PlainFour;
@@ -90,6 +97,22 @@ inline Four load_four(const float* four) {
   return out;
 }
 
+/// Four numbers of each of some blocks. row_of(block) -> where they are.
+template <typename Value, typename RowOf>
+TANDEM_ALWAYS_INLINE Value load_fours(const Block* const* blocks, const RowOf& row_of) {
+#ifdef TANDEM_HAVE_LANES
+  const auto row = [&](int i) { return load(row_of(blocks[i])).v; };
+  if constexpr (Value::kLanes == 16) {
+    const auto low = __builtin_shufflevector(row(0), row(1), 0, 1, 2, 3, 4, 5, 6, 7);
+    const auto high = __builtin_shufflevector(row(2), row(3), 0, 1, 2, 3, 4, 5, 6, 7);
+    return {__builtin_shufflevector(low, high, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15)};
+  } else if constexpr (Value::kLanes == 8) {
+    return {__builtin_shufflevector(row(0), row(1), 0, 1, 2, 3, 4, 5, 6, 7)};
+  } else
+#endif
+    return load_four<Value>(row_of(blocks[0]));
+}
+
 template <typename Four>
 struct FourCorners {
   tandem::frame::Point<Four> corner[3];
@@ -132,13 +155,23 @@ inline std::uint32_t leaf_count(const Block& block) {
   return count;
 }
 
-/// What waits to be visited: on each level three nodes beside the one that is taken next, and four on the
-/// last.
-struct WaitingNode {
-  std::uint32_t block;
-  float near;
-};
+/// A block that waits to be visited: its bound in the upper half, its number in the lower. Bounds are not
+/// negative, so that the numbers have their order.
+using WaitingBlock = std::uint64_t;
 
+inline WaitingBlock waiting_block(float bound, std::uint32_t number) {
+  return std::uint64_t{std::bit_cast<std::uint32_t>(bound)} << 32 | number;
+}
+
+inline float bound_of(WaitingBlock waiting) {
+  return std::bit_cast<float>(static_cast<std::uint32_t>(waiting >> 32));
+}
+
+inline std::uint32_t number_of(WaitingBlock waiting) {
+  return static_cast<std::uint32_t>(waiting);
+}
+
+/// On each level three wait beside the one that is visited next, and four on the last.
 inline constexpr std::uint32_t kMostWaitingNodes = 3 * kMaxDepth + 4;
 
 /// Has the machine load a block that is visited soon.
@@ -157,104 +190,190 @@ inline void fetch_triangles([[maybe_unused]] const Triangle* triangles) {
 }
 
 /// Pushes the nodes of the mask, the nearest last.
-template <typename Four>
-inline void push_nodes(const Block* blocks, const Block& block, const Four& near, unsigned mask,
-                       WaitingNode* stack, std::uint32_t& height) {
-  const std::uint32_t bottom = height;
+inline void push_nodes(const Block* blocks, const Block& block, const float* bounds, unsigned mask,
+                       WaitingBlock*& top) {
+  const WaitingBlock* const bottom = top;
   for (; mask != 0; mask &= mask - 1) {
     const int i = lowest_bit(mask);
-    const WaitingNode next = {block.index[i], near.v[i]};
-    fetch_block(blocks + next.block);
-    std::uint32_t at = height++;
-    for (; at > bottom && stack[at - 1].near < next.near; --at) stack[at] = stack[at - 1];
-    stack[at] = next;
+    const WaitingBlock next = waiting_block(bounds[i], block.index[i]);
+    fetch_block(blocks + block.index[i]);
+    WaitingBlock* at = top++;
+    for (; at > bottom && at[-1] < next; --at) *at = at[-1];
+    *at = next;
   }
 }
 
-template <typename Four>
-class RayWalkBy {
+/// Walks of kVectors vectors of rays, which take turns: while one waits for memory, others go on. Each ray of
+/// a vector has a block of its own, and the four nodes of each are in the vector's lanes.
+template <typename Value, typename Four, int kVectors>
+class RayWalks {
  public:
-  /// Begins with task().
-  void begin() {
-    ray_ = probe::ray_in_frame<Four>(task_.ray);
-    height_ = block_number_ = leaf_mask_ = 0;
-    limit_ = task_.limit;
+  static constexpr int kRaysOfVector = Value::kLanes / kNodesPerBlock;
+  static constexpr int kRays = kRaysOfVector * kVectors;
+
+  explicit RayWalks(const RayStream& stream) : stream_(stream) {
+    for (int i = 0; i < kRays; ++i) begin(i);
   }
 
-  RayTask& task() { return task_; }
-
-  /// Looks at one block, or at the triangles of one. False: there is no other.
-  bool step() {
-    if (leaf_mask_ != 0) {
-      take();
-      return limit_ >= 0 && pop();
+  void run() {
+    while (active_ != 0) {
+#pragma GCC unroll 8
+      for (int i = 0; i < kVectors; ++i) step(i);
     }
-    const Block& block = task_.tree->blocks[block_number_];
-    ++task_.blocks;
-    Four near;
-    const unsigned mask = nodes(block, near);
-    if (mask == 0) return pop();
-    if (block.is_leaf_block()) {
-      const Triangle* const triangles = task_.tree->triangles + block.index[0];
-      fetch_triangles(triangles);
-      leaf_mask_ = mask;
-      leaf_near_ = near;
-      return true;
-    }
-    if ((mask & (mask - 1)) == 0) {
-      block_number_ = block.index[lowest_bit(mask)];
-      fetch_block(task_.tree->blocks + block_number_);
-      return true;
-    }
-    push_nodes(task_.tree->blocks, block, near, mask, stack_, height_);
-    block_number_ = stack_[--height_].block;
-    return true;
   }
 
  private:
-  /// The next block that waits and counts. False: none.
-  bool pop() {
-    do {
-      if (height_ == 0) return false;
-      --height_;
-    } while (stack_[height_].near > limit_);
-    block_number_ = stack_[height_].block;
-    return true;
-  }
+  static constexpr unsigned kAllOfVector = (1u << kRaysOfVector) - 1, kAllNodes = (1u << kNodesPerBlock) - 1;
 
-  /// The nodes that the ray may meet up to the limit, and where at the earliest.
-  unsigned nodes(const Block& block, Four& near) const {
-    const NodeLanes<Four> lanes = node_lanes<Four>(block);
-    return (!probe::misses_box(ray_, lanes.centre, lanes.half_extent, limit_, near)).mask();
-  }
+  static constexpr Block kNoBlock = {};
 
-  /// Takes the triangles of the leaf, that of the nearest box first.
-  void take() {
-    const Block& block = task_.tree->blocks[block_number_];
-    const std::uint32_t first = block.index[0];
-    ++task_.blocks;
-    const FourCorners<Four> corners = four_triangles<Four>(*task_.tree, first, leaf_count(block));
-    unsigned mask = leaf_mask_ & (!probe::passes_triangle(task_.ray, ray_.o, corners.corner)).mask();
-    leaf_mask_ = 0;
-    while (mask != 0) {
-      int next = lowest_bit(mask);
-      for (unsigned left = mask & (mask - 1); left != 0; left &= left - 1) {
-        if (leaf_near_.v[lowest_bit(left)] < leaf_near_.v[next]) next = lowest_bit(left);
+  struct Walk {
+    RayTask task;
+    const Block* blocks;
+    WaitingBlock* top;   ///< of the stack
+    unsigned leaf_mask;  ///< of the triangles that are to be looked at, where the next block is a leaf's
+    float leaf_near[kNodesPerBlock];
+    WaitingBlock stack[kMostWaitingNodes];
+  };
+
+  /// Begins the next ray of the stream. Without one, the walk is not active any longer: no node is within its
+  /// limit.
+  void begin(int number) {
+    Walk& walk = walks_[number];
+    walk.top = walk.stack;
+    if (!stream_.next(stream_.context, static_cast<std::uint32_t>(number), walk.task)) {
+      active_ &= ~(1u << number);
+      block_[number] = &kNoBlock;
+      set_limit(number, -1);
+      return;
+    }
+    active_ |= 1u << number;
+    walk.blocks = block_[number] = walk.task.tree->blocks;
+    auto& rays = rays_[number / kRaysOfVector];
+    const int first = number % kRaysOfVector * kNodesPerBlock;
+    for (int i = first; i < first + kNodesPerBlock; ++i) {
+      for (int k = 0; k < 3; ++k) {
+        rays.o[k].v[i] = walk.task.ray.o[k];
+        rays.inverse[k].v[i] = walk.task.ray.inverse[k];
+        rays.size[k].v[i] = std::fabs(walk.task.ray.inverse[k]);
       }
-      mask &= ~(1u << next);
-      if (leaf_near_.v[next] > limit_) return;
-      limit_ = std::min(limit_, task_.take(task_.context, first + static_cast<std::uint32_t>(next)));
-      if (limit_ < 0) return;
+      rays.slack.v[i] = walk.task.ray.slack;
+    }
+    set_limit(number, walk.task.limit);
+  }
+
+  void set_limit(int number, float limit) {
+    walks_[number].task.limit = limit;
+    const int first = number % kRaysOfVector * kNodesPerBlock;
+    for (int i = first; i < first + kNodesPerBlock; ++i) limits_[number / kRaysOfVector].v[i] = limit;
+  }
+
+  /// Goes on with the next block that waits and counts, or with the next ray.
+  void pop(int number) {
+    Walk& walk = walks_[number];
+    const float limit = walk.task.limit;
+    while (walk.top > walk.stack) {
+      const WaitingBlock next = *--walk.top;
+      if (bound_of(next) > limit) continue;
+      block_[number] = walk.blocks + number_of(next);
+      return;
+    }
+    if (limit >= 0) begin(number);
+  }
+
+  /// Looks at a block of each ray of a vector.
+  TANDEM_ALWAYS_INLINE void step(int vector) {
+    const int first = vector * kRaysOfVector;
+    for (unsigned leaves = leaves_ >> first & kAllOfVector; leaves != 0; leaves &= leaves - 1)
+      take(first + lowest_bit(leaves));
+    NodeLanes<Value> nodes;
+    for (int k = 0; k < 3; ++k) {
+      nodes.centre[k] =
+          load_fours<Value>(block_ + first, [k](const Block* block) { return block->centre[k]; });
+      nodes.half_extent[k] =
+          load_fours<Value>(block_ + first, [k](const Block* block) { return block->half_extent[k]; });
+    }
+    Value bounds;
+    unsigned all =
+        (!probe::misses_box(rays_[vector], nodes.centre, nodes.half_extent, limits_[vector], bounds)).mask();
+    alignas(64) float near[Value::kLanes];
+    __builtin_memcpy(near, &bounds, sizeof near);
+#pragma GCC unroll 4
+    for (int i = 0; i < kRaysOfVector; ++i) {
+      ++walks_[first + i].task.blocks;
+      if (const unsigned mask = all & kAllNodes; mask != 0)
+        enter(first + i, near + i * kNodesPerBlock, mask);
+      else
+        pop(first + i);
+      all >>= kNodesPerBlock;
     }
   }
 
-  probe::RayInFrame<Four> ray_;
-  Four leaf_near_;
-  float limit_;
-  unsigned leaf_mask_;  ///< of the triangles of the block that are to be looked at next; 0: its nodes are
-  std::uint32_t block_number_, height_;
-  RayTask task_;
-  WaitingNode stack_[kMostWaitingNodes];
+  /// Goes on with what is below the nodes of the mask.
+  TANDEM_ALWAYS_INLINE void enter(int number, const float* near, unsigned mask) {
+    Walk& walk = walks_[number];
+    const Block& block = *block_[number];
+    if (block.is_leaf_block()) return wait_for_leaf(number, near, mask);
+    const unsigned others = mask & (mask - 1);
+    if ((others & (others - 1)) != 0) {
+      push_nodes(walk.blocks, block, near, mask, walk.top);
+      block_[number] = walk.blocks + number_of(*--walk.top);
+      return;
+    }
+    // One or two, without a branch: if it is one, it is written to the stack, and does not count there.
+    const int i = lowest_bit(mask), j = lowest_bit(others != 0 ? others : mask);
+    const WaitingBlock one = waiting_block(near[i], block.index[i]);
+    const WaitingBlock other = waiting_block(near[j], block.index[j]);
+    const WaitingBlock next = std::min(one, other), later = one ^ other ^ next;
+    *walk.top = later;
+    walk.top += others != 0;
+    block_[number] = walk.blocks + number_of(next);
+    fetch_block(block_[number]);
+    fetch_block(walk.blocks + number_of(later));
+  }
+
+  /// Has the triangles loaded, and looks at them when it is the ray's turn again.
+  void wait_for_leaf(int number, const float* near, unsigned mask) {
+    Walk& walk = walks_[number];
+    fetch_triangles(walk.task.tree->triangles + block_[number]->index[0]);
+    walk.leaf_mask = mask;
+    for (int i = 0; i < kNodesPerBlock; ++i) walk.leaf_near[i] = near[i];
+    leaves_ |= 1u << number;
+  }
+
+  /// Takes the triangles of a leaf, that of the nearest box first, and goes on.
+  void take(int number) {
+    Walk& walk = walks_[number];
+    const Block& block = *block_[number];
+    RayTask& task = walk.task;
+    leaves_ &= ~(1u << number);
+    const std::uint32_t first = block.index[0];
+    ++task.blocks;
+    const FourCorners<Four> corners = four_triangles<Four>(*task.tree, first, leaf_count(block));
+    Four o[3];
+    for (int k = 0; k < 3; ++k) o[k] = Four{} + task.ray.o[k];
+    unsigned mask = walk.leaf_mask & (!probe::passes_triangle(task.ray, o, corners.corner)).mask();
+    float limit = task.limit;
+    while (mask != 0) {
+      int next = lowest_bit(mask);
+      for (unsigned left = mask & (mask - 1); left != 0; left &= left - 1) {
+        if (walk.leaf_near[lowest_bit(left)] < walk.leaf_near[next]) next = lowest_bit(left);
+      }
+      mask &= ~(1u << next);
+      if (walk.leaf_near[next] > limit) break;
+      limit = std::min(limit, task.take(task.context, first + static_cast<std::uint32_t>(next)));
+      if (limit < 0) return begin(number);
+    }
+    if (limit != task.limit) set_limit(number, limit);
+    pop(number);
+  }
+
+  const RayStream& stream_;
+  probe::RayInFrame<Value> rays_[kVectors] = {};
+  Value limits_[kVectors] = {};
+  unsigned active_ = 0, leaves_ = 0;
+  const Block* block_[kRays] = {};
+  Walk walks_[kRays];
 };
 
 template <typename Four>
@@ -269,8 +388,8 @@ class PointWalkBy {
   }
 
   void run() {
-    WaitingNode stack[kMostWaitingNodes];
-    std::uint32_t height = 0, block_number = 0;
+    WaitingBlock stack[kMostWaitingNodes], *top = stack;
+    std::uint32_t block_number = 0;
     while (true) {
       const Block& block = task_.tree->blocks[block_number];
       ++task_.blocks;
@@ -280,14 +399,16 @@ class PointWalkBy {
         if (block.is_leaf_block()) {
           take(block, mask);
         } else {
-          push_nodes(task_.tree->blocks, block, bound, mask, stack, height);
+          float bounds[kNodesPerBlock];
+          __builtin_memcpy(bounds, &bound, sizeof bounds);
+          push_nodes(task_.tree->blocks, block, bounds, mask, top);
         }
       }
       do {
-        if (height == 0) return settle();
-        --height;
-      } while (!(stack[height].near < limit_));
-      block_number = stack[height].block;
+        if (top == stack) return settle();
+        --top;
+      } while (!(bound_of(*top) < limit_));
+      block_number = number_of(*top);
     }
   }
 
@@ -352,34 +473,26 @@ class PointWalkBy {
 
 template <typename Four>
 void ray_walk_by(RayTask& task) {
-  RayWalkBy<Four> walk;
-  walk.task() = task;
-  walk.begin();
-  while (walk.step()) {
-  }
-  task.blocks = walk.task().blocks;
+  struct One {
+    RayTask& task;
+    bool begun;
+  } one = {task, false};
+  const auto next = [](void* context, std::uint32_t, RayTask& of_walk) {
+    One& only = *static_cast<One*>(context);
+    if (only.begun) {
+      only.task.blocks = of_walk.blocks;
+      return false;
+    }
+    of_walk = only.task;
+    return only.begun = true;
+  };
+  const RayStream stream = {next, &one};
+  RayWalks<Four, Four, 1>(stream).run();
 }
 
-template <typename Four>
+template <typename Value, typename Four>
 void ray_stream_by(const RayStream& stream) {
-  RayWalkBy<Four> walks[kRaysAtOnce];
-  std::uint32_t active[kRaysAtOnce], count = 0;
-  const auto begin = [&](std::uint32_t walk) {
-    if (!stream.next(stream.context, walk, walks[walk].task())) return false;
-    walks[walk].begin();
-    return true;
-  };
-  for (std::uint32_t walk = 0; walk < kRaysAtOnce; ++walk) {
-    if (begin(walk)) active[count++] = walk;
-  }
-  while (count > 0) {
-    for (std::uint32_t i = 0; i < count;) {
-      if (walks[active[i]].step() || begin(active[i]))
-        ++i;
-      else
-        active[i] = active[--count];
-    }
-  }
+  RayWalks<Value, Four, kRaysAtOnce * kNodesPerBlock / Value::kLanes>(stream).run();
 }
 
 template <typename Four>

@@ -3,6 +3,7 @@
 #include "kernels/common/lane_variant.h"
 #include "kernels/points_and_rays/probe_lanes.h"
 #include "kernels/points_and_rays/probe_ways.h"
+#include "kernels/points_and_rays/ray_lanes.h"
 
 namespace tandem {
 
@@ -23,7 +24,11 @@ RayWalk ray_walk(BlockPairVariant variant) {
 }
 
 RayStreamWalk ray_stream_walk(BlockPairVariant variant) {
-  return way_of(variant, RayStreamWalk{ray_stream_by<PlainFour>}, &LaneVariant::ray_stream_walk);
+  return way_of(variant, RayStreamWalk{ray_stream_by<PlainFour, PlainFour>}, &LaneVariant::ray_stream_walk);
+}
+
+const RayGroupWays* ray_group_ways(BlockPairVariant variant) {
+  return way_of(variant, &kRayGroupWaysOf<PlainReal>, &LaneVariant::ray_group_ways);
 }
 
 PointWalk point_walk(BlockPairVariant variant) {

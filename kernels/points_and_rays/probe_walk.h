@@ -9,7 +9,38 @@
 namespace tandem {
 
 /// Walks of rays that are made at once: while one waits for memory, others go on.
-inline constexpr std::uint32_t kRaysAtOnce = 4;
+inline constexpr std::uint32_t kRaysAtOnce = 8;
+
+/// Rays that are made ready and taken into a body's frame at once, coordinate by coordinate.
+inline constexpr std::uint32_t kRaysOfGroup = 8;
+
+struct alignas(64) RayGroup {
+  double origin[3][kRaysOfGroup], direction[3][kRaysOfGroup];
+  double scaled[3][kRaysOfGroup], inverse[3][kRaysOfGroup], factor[kRaysOfGroup];  ///< as WorldRay has them
+  double reach;                                                                    ///< of all
+};
+
+/// Rays as LocalRay has them.
+struct alignas(64) LocalRayGroup {
+  double start[kRaysOfGroup];
+  float o[3][kRaysOfGroup], d[3][kRaysOfGroup], inverse[3][kRaysOfGroup];
+  float slack[kRaysOfGroup], length[kRaysOfGroup], edge_factor[kRaysOfGroup], least_bound[kRaysOfGroup];
+};
+
+/// Bit i is for ray i. A ray of neither mask is out of range.
+struct RayGroupReach {
+  unsigned misses, in_frame;
+};
+
+/// The steps before walks, for all rays of a group.
+struct RayGroupWays {
+  /// Makes rays ready that have origins, directions and a reach.
+  void (*make_ready)(RayGroup& group);
+  /// Finds where rays enter a box. Result: the rays that may meet it.
+  unsigned (*place)(const RayGroup& group, const WorldBox& bounds, double (&place)[3][kRaysOfGroup]);
+  /// Takes rays into a frame that is in range.
+  RayGroupReach (*take_into_frame)(const RayGroup& group, const LocalFrame& frame, LocalRayGroup& out);
+};
 
 /// Takes the triangles that a ray may meet, in no order. Result: the parameter, of the local ray, up to which
 /// others count; below 0: none does.

@@ -7,6 +7,7 @@ namespace tandem {
 /// The named ways, or null where this machine or this build lacks them; all give the same.
 RayWalk ray_walk(BlockPairVariant variant);
 RayStreamWalk ray_stream_walk(BlockPairVariant variant);
+const RayGroupWays* ray_group_ways(BlockPairVariant variant);
 PointWalk point_walk(BlockPairVariant variant);
 
 }  // namespace tandem

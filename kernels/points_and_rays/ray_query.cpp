@@ -1,6 +1,7 @@
 #include "tandem/kernels/ray_query.h"
 
 #include <algorithm>
+#include <bit>
 #include <utility>
 
 #include "kernels/common/check_options.h"
@@ -23,11 +24,13 @@ constexpr std::size_t kMostRaysInPart = 1 << 16;
 struct RaySearch {
   const SceneState* scene = nullptr;
   RayHits wanted = RayHits::first;
+  std::uint32_t number;  // of the ray
   WorldRay ray;
   double last;  // the greatest parameter of the world's ray that counts
   BodyVisit visit;
-  std::uint32_t body;
-  const LocalRay* local;
+  std::uint32_t body;  // that is looked at
+  LocalRay local;      // in its frame, where `reach` says so
+  RayReach reach;
   FoundHit best;
   bool found;
   Buffer<FoundHit> all;
@@ -35,12 +38,34 @@ struct RaySearch {
 
   std::uint64_t blocks = 0, by_float64 = 0;
 
-  void begin(const RayOptions& options, std::uint32_t number, const BoxTree& tree) {
-    ray = world_ray(options.origins[number].data(), options.directions[number].data(), options.reach);
-    last = options.reach;
+  // Begins with a ray of a group.
+  void begin(std::uint32_t of_ray, const RayGroup& group, std::uint32_t i, const BoxTree& tree) {
+    number = of_ray;
+    for (int k = 0; k < 3; ++k) {
+      ray.origin[k] = group.origin[k][i];
+      ray.direction[k] = group.direction[k][i];
+      ray.scaled[k] = group.scaled[k][i];
+      ray.inverse[k] = group.inverse[k][i];
+    }
+    ray.factor = group.factor[i];
+    ray.reach = last = group.reach;
     found = false;
     all.clear();
     visit.begin(tree);
+  }
+
+  // Takes a ray of a group in the frame of the body.
+  void take_local(const LocalRayGroup& group, std::uint32_t i) {
+    for (int k = 0; k < 3; ++k) {
+      local.o[k] = group.o[k][i];
+      local.d[k] = group.d[k][i];
+      local.inverse[k] = group.inverse[k][i];
+    }
+    local.slack = group.slack[i];
+    local.length = group.length[i];
+    local.edge_factor = group.edge_factor[i];
+    local.least_bound = group.least_bound[i];
+    local.start = group.start[i];
   }
 
   void corners_of(const FoundHit& hit, double (&out)[3][3]) const {
@@ -81,7 +106,7 @@ struct RaySearch {
 float take_triangle(void* context, std::uint32_t triangle) {
   RaySearch& search = *static_cast<RaySearch*>(context);
   if (!search.take(triangle)) return -1;
-  return local_limit(search.ray, *search.local, search.last);
+  return local_limit(search.ray, search.local, search.last);
 }
 
 // A walk of a body that float32 cannot take.
@@ -118,7 +143,7 @@ Status check(SceneState& scene, const RayOptions& options) {
 // A thread has this for the rays that it answers.
 struct RayWorker {
   ProbeOrder order;
-  RaySearch searches[kRaysAtOnce];
+  RaySearch searches[kRaysAtOnce + kRaysOfGroup];
   Buffer<RayHit> rows;  // of all hits
   bool enough_memory = true;
 
@@ -140,44 +165,86 @@ struct RayBatch {
   const ProbedBodies& bodies;
   const RayOptions& options;
   RayStreamWalk walk;
+  const RayGroupWays& ways;
   std::uint32_t workers;
   RayHit* rows;          // of each ray; null where all hits are asked for
   std::uint32_t* count;  // of each ray's hits, where all are asked for
 
   void answer(std::uint32_t first, std::uint32_t last, RayWorker& worker) const;
-  void take_hits(std::uint32_t ray, RaySearch& search, RayWorker& worker) const;
+  void miss(std::uint32_t ray) const;
+  void take_hits(RaySearch& search, RayWorker& worker) const;
+  bool goes_on(RaySearch& search) const;
+  bool enters_body(RaySearch& search, RayTask& task) const;
   bool walks_on(RaySearch& search, RayTask& task) const;
+  void take_into_frames(const RayGroup& group, RaySearch* const* searches, unsigned which) const;
 };
 
-// Finds the next body that a ray's tree walk is to look at. False: the search is over.
-bool RayBatch::walks_on(RaySearch& search, RayTask& task) const {
+// Finds the next body that a ray's search is to look at. False: the search is over.
+bool RayBatch::goes_on(RaySearch& search) const {
   const auto first_in = [&](const WorldBox& box) {
     double first = 0, last = search.last / search.ray.factor;
     return meets_box(search.ray, box.lo, box.hi, first, last) ? first : HUGE_VAL;
   };
-  while (!(search.wanted == RayHits::any && search.found) && search.enough_memory) {
+  if ((search.wanted == RayHits::any && search.found) || !search.enough_memory) return false;
+  do {
     // Rounded up, as a bound of a box that is just as far may be.
     const double limit = search.last / search.ray.factor * (1 + 0x1p-50);
     search.body = search.visit.next(bodies.tree(), first_in, limit);
-    if (search.body == kNoIndex) return false;
-    if (!scene.is_body(search.body)) continue;
-    const PosedTree& tree = scene.bodies[search.body];
-    const RayReach reach = local_ray(bodies.frame(search.body), search.ray, search.last, task.ray);
-    if (reach == RayReach::out_of_range) walk_world_boxes(tree, search);
-    if (reach != RayReach::in_frame) continue;
-    task.tree = &tree.tree;
-    task.limit = task.ray.length;
-    task.take = take_triangle;
-    task.context = &search;
-    task.blocks = 0;
-    search.local = &task.ray;
-    return true;
+  } while (search.body != kNoIndex && !scene.is_body(search.body));
+  return search.body != kNoIndex;
+}
+
+// Makes the task of a walk through the body of a search. False: there is nothing to walk.
+bool RayBatch::enters_body(RaySearch& search, RayTask& task) const {
+  const PosedTree& tree = scene.bodies[search.body];
+  if (search.reach == RayReach::out_of_range) walk_world_boxes(tree, search);
+  if (search.reach != RayReach::in_frame) return false;
+  task.tree = &tree.tree;
+  task.ray = search.local;
+  task.limit = task.ray.length;
+  task.take = take_triangle;
+  task.context = &search;
+  task.blocks = 0;
+  return true;
+}
+
+// Makes the task of a walk through the next body. False: the search is over.
+bool RayBatch::walks_on(RaySearch& search, RayTask& task) const {
+  while (goes_on(search)) {
+    search.reach = local_ray(bodies.frame(search.body), search.ray, search.last, search.local);
+    if (enters_body(search, task)) return true;
   }
   return false;
 }
 
+// Takes rays of a group into the frames of the bodies that they look at first.
+void RayBatch::take_into_frames(const RayGroup& group, RaySearch* const* searches, unsigned which) const {
+  LocalRayGroup local;
+  for (unsigned left = which; left != 0;) {
+    const std::uint32_t body = searches[std::countr_zero(left)]->body;
+    const LocalFrame& frame = bodies.frame(body);
+    const RayGroupReach reach =
+        frame.in_range ? ways.take_into_frame(group, frame, local) : RayGroupReach{0, 0};
+    for (std::uint32_t i = 0; i < kRaysOfGroup; ++i) {
+      if ((left >> i & 1) == 0 || searches[i]->body != body) continue;
+      left &= ~(1u << i);
+      const bool misses = (reach.misses >> i & 1) != 0, in_frame = (reach.in_frame >> i & 1) != 0;
+      searches[i]->reach = misses ? RayReach::misses : in_frame ? RayReach::in_frame : RayReach::out_of_range;
+      if (in_frame) searches[i]->take_local(local, i);
+    }
+  }
+}
+
+void RayBatch::miss(std::uint32_t ray) const {
+  if (rows != nullptr)
+    rows[ray] = row_without_hit(ray);
+  else
+    count[ray] = 0;
+}
+
 // Writes what was found of a ray.
-void RayBatch::take_hits(std::uint32_t ray, RaySearch& search, RayWorker& worker) const {
+void RayBatch::take_hits(RaySearch& search, RayWorker& worker) const {
+  const std::uint32_t ray = search.number;
   if (rows != nullptr) {
     rows[ray] = search.found ? row_of(scene, ray, search.best) : row_without_hit(ray);
     return;
@@ -190,56 +257,138 @@ void RayBatch::take_hits(std::uint32_t ray, RaySearch& search, RayWorker& worker
     worker.enough_memory = worker.enough_memory && worker.rows.push(row_of(scene, ray, hit), workers);
 }
 
-// Feeds walks with the rays of an order.
-struct RayFeed {
-  const RayBatch& batch;
-  RayWorker& worker;
-  std::size_t at = 0;
-  std::uint32_t ray[kRaysAtOnce] = {};  // of each walk; kNoIndex: none
+// Writes a ray to a group.
+void set_ray(RayGroup& group, std::uint32_t i, const RayOptions& options, std::uint32_t ray) {
+  for (int k = 0; k < 3; ++k) {
+    group.origin[k][i] = options.origins[ray][k];
+    group.direction[k][i] = options.directions[ray][k];
+  }
+}
 
-  bool next(std::uint32_t number, RayTask& task) {
-    RaySearch& search = worker.searches[number];
-    std::uint32_t& of_walk = ray[number];
-    if (of_walk != kNoIndex) search.blocks += task.blocks;
-    while (of_walk == kNoIndex || !batch.walks_on(search, task)) {
-      if (of_walk != kNoIndex) batch.take_hits(of_walk, search, worker);
-      if (at == worker.order.size() || !worker.enough_memory) return false;
-      fetch(worker.order.ahead(at));
-      of_walk = worker.order[at++];
-      search.begin(batch.options, of_walk, batch.bodies.tree());
+// Feeds walks with the rays of an order, which are begun in groups.
+class RayFeed {
+ public:
+  RayFeed(const RayBatch& batch, RayWorker& worker) : batch_(batch), worker_(worker) {
+    for (RaySearch& search : worker.searches) idle_[idle_count_++] = &search;
+    group_.reach = batch.options.reach;
+  }
+
+  bool next(std::uint32_t walk, RayTask& task) {
+    RaySearch*& search = search_of_[walk];
+    if (search != nullptr) {
+      search->blocks += task.blocks;
+      if (batch_.walks_on(*search, task)) return true;
+      end(search);
     }
-    return true;
+    while (worker_.enough_memory) {
+      if (ready_count_ == 0 && !begin_group()) return false;
+      search = ready_[--ready_count_];
+      if (batch_.enters_body(*search, task) || batch_.walks_on(*search, task)) return true;
+      end(search);
+    }
+    return false;
+  }
+
+ private:
+  void end(RaySearch*& search) {
+    batch_.take_hits(*search, worker_);
+    idle_[idle_count_++] = std::exchange(search, nullptr);
+  }
+
+  // Begins rays that follow each other; those that look at no body are answered at once. False: there are no
+  // more.
+  bool begin_group() {
+    while (ready_count_ == 0 && at_ < worker_.order.size()) {
+      const auto count =
+          static_cast<std::uint32_t>(std::min<std::size_t>(kRaysOfGroup, worker_.order.size() - at_));
+      for (std::uint32_t i = 0; i < kRaysOfGroup; ++i) {
+        fetch(worker_.order.ahead(at_ + (i < count ? i : 0)));
+        set_ray(group_, i, batch_.options, worker_.order[at_ + (i < count ? i : 0)]);
+      }
+      batch_.ways.make_ready(group_);
+      begin_searches(count);
+      at_ += count;
+    }
+    return ready_count_ > 0;
+  }
+
+  void begin_searches(std::uint32_t count) {
+    RaySearch* searches[kRaysOfGroup];
+    unsigned going_on = 0;
+    for (std::uint32_t i = 0; i < count; ++i) {
+      RaySearch& search = *(searches[i] = idle_[--idle_count_]);
+      search.begin(worker_.order[at_ + i], group_, i, batch_.bodies.tree());
+      if (batch_.goes_on(search)) going_on |= 1u << i;
+    }
+    batch_.take_into_frames(group_, searches, going_on);
+    for (std::uint32_t i = count; i-- > 0;) {
+      if ((going_on >> i & 1) != 0)
+        ready_[ready_count_++] = searches[i];
+      else
+        end(searches[i]);
+    }
   }
 
   void fetch(std::uint32_t soon) const {
-    fetch_ahead(batch.options.origins[soon].data());
-    fetch_ahead(batch.options.directions[soon].data());
-    if (batch.rows != nullptr) fetch_ahead(batch.rows + soon);
+    fetch_ahead(batch_.options.origins[soon].data());
+    fetch_ahead(batch_.options.directions[soon].data());
+    if (batch_.rows != nullptr) fetch_ahead(batch_.rows + soon);
   }
+
+  const RayBatch& batch_;
+  RayWorker& worker_;
+  std::size_t at_ = 0;
+  RayGroup group_;
+  RaySearch* search_of_[kRaysAtOnce] = {};  // of each walk
+  RaySearch *ready_[kRaysOfGroup], *idle_[kRaysAtOnce + kRaysOfGroup];
+  std::uint32_t ready_count_ = 0, idle_count_ = 0;
+};
+
+// Finds where rays, which are asked about in ascending order, enter the scene. Those that miss it are
+// answered.
+class RayPlaces {
+ public:
+  RayPlaces(const RayBatch& batch, std::uint32_t first, std::uint32_t last)
+      : batch_(batch), next_(first), last_(last) {
+    group_.reach = batch.options.reach;
+  }
+
+  bool operator()(std::uint32_t ray, double* out) {
+    if (ray == next_) find_places();
+    const std::uint32_t i = ray + kRaysOfGroup - next_;
+    if ((meets_ >> i & 1) == 0) {
+      batch_.miss(ray);
+      return false;
+    }
+    for (int k = 0; k < 3; ++k) out[k] = place_[k][i];
+    return true;
+  }
+
+ private:
+  void find_places() {
+    for (std::uint32_t i = 0; i < kRaysOfGroup; ++i)
+      set_ray(group_, i, batch_.options, std::min(next_ + i, last_ - 1));
+    batch_.ways.make_ready(group_);
+    const WorldBox bounds = batch_.bodies.bounds();
+    meets_ = batch_.ways.place(group_, bounds, place_);
+    next_ += kRaysOfGroup;
+  }
+
+  const RayBatch& batch_;
+  std::uint32_t next_, last_;  // the first ray of the next group, and the end
+  RayGroup group_;
+  double place_[3][kRaysOfGroup];
+  unsigned meets_ = 0;
 };
 
 // Rays that enter the scene near each other follow each other; those that miss it are answered at once.
 void RayBatch::answer(std::uint32_t first, std::uint32_t last, RayWorker& worker) const {
-  const WorldBox bounds = bodies.bounds();
-  const auto place = [&](std::uint32_t i, double* out) {
-    const WorldRay ray = world_ray(options.origins[i].data(), options.directions[i].data(), options.reach);
-    double begin = 0, end = HUGE_VAL;
-    if (!meets_box(ray, bounds.lo, bounds.hi, begin, end)) {
-      if (rows != nullptr)
-        rows[i] = row_without_hit(i);
-      else
-        count[i] = 0;
-      return false;
-    }
-    for (int k = 0; k < 3; ++k) out[k] = ray.origin[k] + begin * ray.scaled[k];
-    return true;
-  };
-  if (!worker.order.make(first, last, place)) {
+  RayPlaces places(*this, first, last);
+  if (!worker.order.make(first, last, places)) {
     worker.enough_memory = false;
     return;
   }
-  RayFeed feed = {*this, worker};
-  std::fill_n(feed.ray, kRaysAtOnce, kNoIndex);
+  RayFeed feed(*this, worker);
   const auto next = [](void* context, std::uint32_t number, RayTask& task) {
     return static_cast<RayFeed*>(context)->next(number, task);
   };
@@ -250,6 +399,7 @@ void RayBatch::answer(std::uint32_t first, std::uint32_t last, RayWorker& worker
 
 struct RayQuery::State : Allocated {
   RayStreamWalk walk = best_way(ray_stream_walk);
+  const RayGroupWays& ways = *best_way(ray_group_ways);
   ProbedBodies bodies;
   PerWorker<RayWorker> workers;
   Buffer<std::uint32_t> begin;  // of each ray's hits, where all are asked for
@@ -272,6 +422,7 @@ Status RayQuery::answer(SceneState& scene, const RayOptions& options) {
                           state.bodies,
                           options,
                           state.walk,
+                          state.ways,
                           workers,
                           all ? nullptr : rows_.data(),
                           all ? state.begin.data() + 1 : nullptr};

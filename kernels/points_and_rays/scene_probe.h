@@ -62,7 +62,7 @@ class ProbeOrder {
   /// Orders the things first to last - 1 by Morton's order of their places. place(i, out) writes three
   /// numbers of thing i; false: the thing is left out. False: out of memory.
   template <typename Place>
-  [[nodiscard]] bool make(std::uint32_t first, std::uint32_t last, const Place& place);
+  [[nodiscard]] bool make(std::uint32_t first, std::uint32_t last, Place&& place);
 
   /// The number of things that were not left out.
   std::size_t size() const { return keys_.size(); }
@@ -88,7 +88,7 @@ class ProbeOrder {
 };
 
 template <typename PlaceOf>
-bool ProbeOrder::make(std::uint32_t first, std::uint32_t last, const PlaceOf& place) {
+bool ProbeOrder::make(std::uint32_t first, std::uint32_t last, PlaceOf&& place) {
   if (!places_.resize(last - first)) return false;
   std::size_t count = 0;
   for (std::uint32_t i = first; i < last; ++i) {

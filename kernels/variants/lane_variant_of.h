@@ -6,6 +6,7 @@
 #include "kernels/manifold/patch_walk_lanes.h"
 #include "kernels/manifold/piece_lanes.h"
 #include "kernels/points_and_rays/probe_lanes.h"
+#include "kernels/points_and_rays/ray_lanes.h"
 #include "kernels/refit/refit_lanes.h"
 
 #ifdef TANDEM_HAVE_LANES
@@ -40,7 +41,8 @@ constexpr LaneVariant kLaneVariantOf = {block_pair_mask_of_lanes<kCount>,
                                         &kManifoldLanes,
                                         refit_of_lanes<kCount>,
                                         ray_walk_by<Lanes4>,
-                                        ray_stream_by<Lanes4>,
+                                        ray_stream_by<Lanes<kCount>, Lanes4>,
+                                        &kRayGroupWaysOf<RealLanes<kCount / 2>>,
                                         point_walk_by<Lanes4>};
 
 }  // namespace

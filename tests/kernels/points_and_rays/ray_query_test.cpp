@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <string>
+#include <utility>
 
 #include "kernels/contact/contact_query_fixture.h"
 #include "kernels/geometry/ray_triangle.h"
@@ -207,6 +208,128 @@ TEST(Rays, EveryWayNamesTheSameTriangles) {
       ASSERT_EQ(named, plain);
     }
   }
+}
+
+// The rays of a test of streams, and what is named of each.
+struct NamedByStream {
+  struct Ray {
+    RayTask task;
+    std::vector<std::uint32_t> named;
+  };
+  std::vector<Ray> rays;
+  std::size_t begun = 0;
+  Ray* of_walk[kRaysAtOnce] = {};
+
+  static bool next(void* context, std::uint32_t walk, RayTask& task) {
+    NamedByStream& stream = *static_cast<NamedByStream*>(context);
+    Ray*& ray = stream.of_walk[walk];
+    if (ray != nullptr) ray->named.push_back(static_cast<std::uint32_t>(task.blocks));
+    ray = stream.begun < stream.rays.size() ? &stream.rays[stream.begun++] : nullptr;
+    if (ray != nullptr) task = ray->task;
+    return ray != nullptr;
+  }
+};
+
+// Walks that share a vector do not see each other: streams of fewer and more rays than walks.
+TEST(Rays, EveryStreamNamesTheTrianglesOfSingleWalks) {
+  test::SampleAssets assets;
+  RandomPoses random(6);
+  assets.add(test::soup(random, 300, 0.2));
+  const LevelView level = assets.views()[0].level();
+  const FileHeader& header = *assets.views()[0].header;
+  const LocalFrame frame = local_frame(kIdentityPose, extent_of(level.blocks[0]), header.lower, header.upper);
+  for (const std::size_t count : {1, 2, 3, 5, 8, 9, 500}) {
+    NamedByStream stream;
+    while (stream.rays.size() < count) {
+      const Vector from = test::random_place(random, 2), along = test::random_place(random, 1);
+      const WorldRay ray = world_ray(from.data(), along.data(), HUGE_VAL);
+      NamedByStream::Ray& next = stream.rays.emplace_back();
+      if (local_ray(frame, ray, HUGE_VAL, next.task.ray) != RayReach::in_frame) stream.rays.pop_back();
+    }
+    std::vector<std::vector<std::uint32_t>> alone;
+    for (NamedByStream::Ray& ray : stream.rays) {
+      ray.task.tree = &level;
+      ray.task.limit = ray.task.ray.length;
+      ray.task.context = &ray.named;
+      // Every other triangle makes the limit less, and some end the search.
+      ray.task.take = [](void* context, std::uint32_t triangle) {
+        static_cast<std::vector<std::uint32_t>*>(context)->push_back(triangle);
+        return triangle % 16 == 3 ? -1 : triangle % 2 == 0 ? 1.5f : HUGE_VALF;
+      };
+      RayTask task = ray.task;
+      ray_walk(BlockPairVariant::scalar)(task);
+      alone.push_back(std::exchange(ray.named, {}));
+      alone.back().push_back(static_cast<std::uint32_t>(task.blocks));
+    }
+    for (const BlockPairVariant variant : kBlockPairVariants) {
+      if (ray_stream_walk(variant) == nullptr) continue;
+      stream.begun = 0;
+      for (NamedByStream::Ray& ray : stream.rays) ray.named.clear();
+      ray_stream_walk(variant)({NamedByStream::next, &stream});
+      for (std::size_t i = 0; i < count; ++i) ASSERT_EQ(stream.rays[i].named, alone[i]);
+    }
+  }
+}
+
+// Rays with coordinates that are 0, tiny and large, in frames near and far.
+TEST(Rays, EveryWayTakesAGroupOfRaysIntoAFrameAsOneByOne) {
+  RandomPoses random(8);
+  const float lower[3] = {-1, -1, -1}, upper[3] = {1, 1, 1};
+  const double sizes[] = {0, 5e-324, 1e-310, 1e-200, 1, 1, 1, 1, 1, 1e30, 1e100, 1e290};
+  const auto coordinate = [&] { return sizes[random.below(std::size(sizes))] * random.symmetric(1); };
+  const TreeExtent extent = {{1, 1, 1}, {1, 1, 1}, {1, 1, 1}};
+  int of_reach[3] = {};
+  for (int i = 0; i < 3000; ++i) {
+    RayGroup group;
+    group.reach = i % 3 == 0 ? HUGE_VAL : i % 3 == 1 ? 2 : 1e-3;
+    const Pose pose = random.pose({.translation = i % 2 == 0 ? 1.0 : 1e6});
+    const LocalFrame frame = local_frame(pose, extent, lower, upper);
+    for (std::uint32_t r = 0; r < kRaysOfGroup; ++r) {
+      for (int k = 0; k < 3; ++k) {
+        group.origin[k][r] = coordinate() + (r % 2 == 0 ? 0 : frame.translation[k]);
+        group.direction[k][r] = coordinate();
+      }
+      if (group.direction[0][r] == 0 && group.direction[1][r] == 0) group.direction[2][r] = 1;
+    }
+    const WorldBox bounds = {{-1, -2, 0}, {1, 2, 0}};
+    for (const BlockPairVariant variant : kBlockPairVariants) {
+      const RayGroupWays* const ways = ray_group_ways(variant);
+      if (ways == nullptr) continue;
+      ways->make_ready(group);
+      double place[3][kRaysOfGroup];
+      LocalRayGroup local;
+      const unsigned placed = ways->place(group, bounds, place);
+      const RayGroupReach reach = ways->take_into_frame(group, frame, local);
+      for (std::uint32_t r = 0; r < kRaysOfGroup; ++r) {
+        const double origin[3] = {group.origin[0][r], group.origin[1][r], group.origin[2][r]};
+        const double direction[3] = {group.direction[0][r], group.direction[1][r], group.direction[2][r]};
+        const WorldRay ray = world_ray(origin, direction, group.reach);
+        double begin = 0, end = HUGE_VAL;
+        ASSERT_EQ((placed >> r & 1) != 0, meets_box(ray, bounds.lo, bounds.hi, begin, end));
+        LocalRay alone;
+        const RayReach expected = local_ray(frame, ray, group.reach, alone);
+        ++of_reach[static_cast<int>(expected)];
+        ASSERT_EQ((reach.misses >> r & 1) != 0, expected == RayReach::misses);
+        ASSERT_EQ((reach.in_frame >> r & 1) != 0, expected == RayReach::in_frame);
+        ASSERT_EQ(group.factor[r], ray.factor);
+        for (int k = 0; k < 3; ++k) {
+          ASSERT_EQ(group.scaled[k][r], ray.scaled[k]);
+          ASSERT_EQ(group.inverse[k][r], ray.inverse[k]);
+          if (expected != RayReach::in_frame) continue;
+          ASSERT_EQ(local.o[k][r], alone.o[k]);
+          ASSERT_EQ(local.d[k][r], alone.d[k]);
+          ASSERT_EQ(local.inverse[k][r], alone.inverse[k]);
+        }
+        if (expected != RayReach::in_frame) continue;
+        ASSERT_EQ(local.start[r], alone.start);
+        ASSERT_EQ(local.slack[r], alone.slack);
+        ASSERT_EQ(local.length[r], alone.length);
+        ASSERT_EQ(local.edge_factor[r], alone.edge_factor);
+        ASSERT_EQ(local.least_bound[r], alone.least_bound);
+      }
+    }
+  }
+  for (const int count : of_reach) EXPECT_GT(count, 100);
 }
 
 TEST(Rays, WhatIsNoRayIsNamed) {

@@ -5,6 +5,9 @@ import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { fileURLToPath } from "node:url";
 
+import { Rows } from "../../build/web/tandem/memory.mjs";
+import { layouts } from "../../build/web/tandem/rows.mjs";
+
 export const ROOT = fileURLToPath(new URL("../../", import.meta.url));
 const builds = process.env.TANDEM_NATIVE_BUILD ? [process.env.TANDEM_NATIVE_BUILD] : ["test", "release"].map((name) => join(ROOT, "build", name));
 const parts = { bvhbuild: "tools/bvhbuild/bvhbuild", library: "bindings/c/libtandem.so" };
@@ -41,4 +44,27 @@ export function answers(a, b, poses) {
 export function mesh_path(name) {
   const places = [join(ROOT, "assets", name), join(process.env.TANDEM_MESHES ?? join(ROOT, "../shared/meshes"), name)];
   return places.find((path) => existsSync(path)) ?? null;
+}
+
+/** The answers of answers(), one after the other: four kinds of rows, and counters. */
+export function* each_answer(bytes) {
+  const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
+  let at = 0;
+  const take = (size) => bytes.subarray(at, (at += size));
+  const COUNTERS = ["object_pairs", "block_pairs", "candidates", "decided_by_float32", "decided_by_float64", "decided_exactly", "contacts"];
+  while (at < bytes.length) {
+    const rows = ["contact", "manifold", "manifold_point", "distance"].map((name) => {
+      const count = Number(view.getBigUint64(at, true));
+      at += 8;
+      return take(count * layouts[`tandem_${name}`].bytes);
+    });
+    const counters = Object.fromEntries(COUNTERS.map((name, i) => [name, Number(view.getBigUint64(at + 8 * i, true))]));
+    at += 8 * COUNTERS.length;
+    yield { rows, counters };
+  }
+}
+
+/** A field of rows that each_answer() gives. */
+export function column(bytes, name, field) {
+  return [...new Rows(`tandem_${name}`, bytes).column(field)];
 }

@@ -6,7 +6,6 @@ import { basename, extname, join } from "node:path";
 import { before, test } from "node:test";
 
 import * as native from "./native.mjs";
-import { layouts } from "../../build/web/tandem/rows.mjs";
 import * as tandem from "../../build/web/tandem/tandem.mjs";
 
 const ASSETS = ["box_12.obj", "box_192.obj", "cow_1500.obj", "cow.obj", "ground.obj"];
@@ -63,24 +62,6 @@ function ask(scene, poses) {
   return { rows: [contacts, manifolds, points, distances], counters };
 }
 
-// The native answers, one list of rows after the other.
-function* native_answers(bytes) {
-  const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
-  let at = 0;
-  const take = (size) => bytes.subarray(at, (at += size));
-  const COUNTERS = ["object_pairs", "block_pairs", "candidates", "decided_by_float32", "decided_by_float64", "decided_exactly", "contacts"];
-  while (at < bytes.length) {
-    const rows = ["contact", "manifold", "manifold_point", "distance"].map((name) => {
-      const count = Number(view.getBigUint64(at, true));
-      at += 8;
-      return take(count * layouts[`tandem_${name}`].bytes);
-    });
-    const counters = Object.fromEntries(COUNTERS.map((name, i) => [name, Number(view.getBigUint64(at + 8 * i, true))]));
-    at += 8 * COUNTERS.length;
-    yield { rows, counters };
-  }
-}
-
 for (const name of [...ASSETS, ...MESHES]) {
   const path = native.mesh_path(name);
   test(`${name} becomes the bytes that bvhbuild writes`, { skip: native.missing || (path === null && `${name} is not here (TANDEM_MESHES)`) }, () => {
@@ -101,7 +82,7 @@ for (const [a, b] of COMPARED) {
     const assets = files.map((file) => tandem.Asset.from_bytes(readFileSync(file)));
     const scene = new tandem.Scene(assets);
     const poses = poses_of(assets, 20);
-    const theirs = [...native_answers(native.answers(...files, poses.map((pair) => pair.flatMap(numbers_of))))];
+    const theirs = [...native.each_answer(native.answers(...files, poses.map((pair) => pair.flatMap(numbers_of))))];
     let touching = 0;
     poses.forEach((pair, i) => {
       const ours = ask(scene, pair);

@@ -22,8 +22,8 @@ const char* skip_word(const char* at, const char* last, const char* lower_case) 
   return at;
 }
 
-// Returns the end of "12.5e-3", "inf", "infinity" or "nan", as strtod() knows them without a sign; `first` where
-// there is none of these. has_value becomes true where some digit is not 0.
+// Returns the end of "12.5e-3", "inf", "infinity" or "nan", as strtod() knows them without a sign; `first`
+// where there is none of these. has_value becomes true where some digit is not 0.
 const char* number_end(const char* first, const char* last, bool& has_value) {
   const char* const whole = skip_digits(first, last);
   const char* end = whole;
@@ -49,8 +49,8 @@ const char* number_end(const char* first, const char* last, bool& has_value) {
 
 }  // namespace
 
-// musl's strtod() rounds correctly, and the program never leaves the locale "C". The scanner, which alone calls
-// this, takes signs itself.
+// musl's strtod() rounds correctly, and the program never leaves the locale "C". The scanner, which alone
+// calls this, takes signs itself.
 std::from_chars_result std::from_chars(const char* first, const char* last, double& value) {
   bool has_value = false;
   const char* const end = number_end(first, last, has_value);
@@ -66,7 +66,8 @@ std::from_chars_result std::from_chars(const char* first, const char* last, doub
     read = strtod(string(first, end).c_str(), nullptr);
   }
   const bool is_finite_word = *first == '.' || (*first >= '0' && *first <= '9');
-  if (is_finite_word && (std::isinf(read) || (read == 0 && has_value))) return {end, errc::result_out_of_range};
+  if (is_finite_word && (std::isinf(read) || (read == 0 && has_value)))
+    return {end, errc::result_out_of_range};
   value = read;
   return {end, errc{}};
 }

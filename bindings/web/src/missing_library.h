@@ -25,7 +25,9 @@ struct atomic_ref {
   Value& value;
 
   explicit atomic_ref(Value& shared) : value(shared) {}
-  Value fetch_add(Value more, memory_order) const { return __atomic_fetch_add(&value, more, __ATOMIC_SEQ_CST); }
+  Value fetch_add(Value more, memory_order) const {
+    return __atomic_fetch_add(&value, more, __ATOMIC_SEQ_CST);
+  }
 };
 
 }  // namespace std

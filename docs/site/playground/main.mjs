@@ -70,6 +70,12 @@ async function ask() {
 }
 
 const format = (x) => (x === 0 ? "0" : Math.abs(x) >= 1e-3 && Math.abs(x) < 1e6 ? x.toPrecision(6) : x.toExponential(4));
+// A bound that is rounded stays one.
+function rounded_up(x) {
+  if (x === 0) return "0";
+  const unit = 10 ** (Math.floor(Math.log10(x)) - 2);
+  return String(Number((Math.ceil(x / unit) * unit).toPrecision(3)));
+}
 const count = (x) => x.toLocaleString("en");
 
 function show(answer, { poses: at }) {
@@ -79,7 +85,7 @@ function show(answer, { poses: at }) {
   if (manifolds) show_manifolds(points);
   if (distance) {
     if (distance.upper > 0) picture.add_lines("nearest", [[distance.point_a, distance.point_b]]);
-    picture.add_points([distance.point_a, distance.point_b]);
+    picture.add_points("nearest", [distance.point_a, distance.point_b]);
   }
   if (boxes) picture.add_boxes(boxes.boxes, (corner) => placed(at[boxes.slot], corner));
   const texts = {
@@ -99,9 +105,10 @@ function show(answer, { poses: at }) {
 
 // A line at each point along its normal: as long as the depth, and at least so long that it is seen.
 function show_manifolds(points) {
-  const least = 0.06 * meshes.b.radius;
+  const least = 0.1 * meshes.b.radius;
   const ends = points.map(({ position, normal, depth }) => [position, position.map((x, i) => x + Math.max(depth, least) * normal[i])]);
   picture.add_lines("normal", ends);
+  picture.add_points("normal", points.map(({ position }) => position));
 }
 
 // ---- Meshes
@@ -114,7 +121,7 @@ function took(slot, mesh) {
   state[`l${slot}`] = mesh.level;
   const select = by_id(`level-${slot}`);
   select.replaceChildren(...mesh.levels.map(({ triangle_count, error_bound }, level) =>
-    new Option(`${level}: ${count(triangle_count)} triangles, error ${error_bound === 0 ? "0" : `at most ${format(error_bound)}`}`, level)));
+    new Option(`${count(triangle_count)} ± ${rounded_up(error_bound)}`, level)));
   select.value = String(mesh.level);
   select.disabled = mesh.levels.length === 1;
   picture.set_mesh(slot, mesh.positions);

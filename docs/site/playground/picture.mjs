@@ -2,7 +2,7 @@
 import * as THREE from "./three/three.module.js";
 
 const colour_of = (name) => new THREE.Color(getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim());
-const lines_of = (positions) => new THREE.BufferGeometry().setAttribute("position", new THREE.BufferAttribute(Float32Array.from(positions), 3));
+const geometry_of = (positions) => new THREE.BufferGeometry().setAttribute("position", new THREE.BufferAttribute(Float32Array.from(positions), 3));
 // The corners of a box that its twelve edges join: bit 0 is x, bit 1 y, bit 2 z.
 const EDGES = [0, 1, 2, 3, 4, 5, 6, 7, 0, 2, 1, 3, 4, 6, 5, 7, 0, 4, 1, 5, 2, 6, 3, 7];
 
@@ -12,12 +12,14 @@ export class Picture {
     this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, preserveDrawingBuffer: true });
     this.scene = new THREE.Scene();
     this.camera = new THREE.PerspectiveCamera(40, 1, 0.01, 1000);
+    this.camera.up.set(0, 0, 1);
     this.scene.add(new THREE.HemisphereLight(0xffffff, 0x667788, 0.75));
     this.lamp = new THREE.DirectionalLight(0xffffff, 0.55);
     this.scene.add(this.lamp);
     this.slots = { a: this.#slot("mesh-a"), b: this.#slot("mesh-b") };
-    this.materials = { normal: this.#line("normal"), nearest: this.#line("nearest"), box: this.#line("box") };
-    this.points = new THREE.PointsMaterial({ size: 7, sizeAttenuation: false, depthTest: false, transparent: true });
+    this.materials = { normal: this.#line(), nearest: this.#line(), box: this.#line() };
+    const dots = () => new THREE.PointsMaterial({ size: 7, sizeAttenuation: false, depthTest: false, transparent: true });
+    this.dots = { normal: dots(), nearest: dots() };
     this.marks = new THREE.Group();
     this.scene.add(this.marks);
     this.recolour();
@@ -51,7 +53,7 @@ export class Picture {
       touching.material.color = colour_of("contact");
     }
     for (const [name, material] of Object.entries(this.materials)) material.color = colour_of(name);
-    this.points.color = colour_of("nearest");
+    for (const [name, material] of Object.entries(this.dots)) material.color = colour_of(name);
     this.draw();
   }
 
@@ -60,21 +62,21 @@ export class Picture {
     this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
     this.renderer.setSize(clientWidth, clientHeight, false);
     this.camera.aspect = clientWidth / Math.max(clientHeight, 1);
-    this.camera.updateProjectionMatrix();
+    if (this.view) this.look(this.view);
     this.draw();
   }
 
   set_mesh(slot, positions) {
     const { mesh, touching } = this.slots[slot];
     mesh.geometry.dispose();
-    mesh.geometry = lines_of(positions);
+    mesh.geometry = geometry_of(positions);
     mesh.geometry.computeVertexNormals();
     mesh.visible = true;
     touching.visible = false;
     this.slots[slot].positions = positions;
   }
 
-  /** q, position: as of pose_about(), of a mesh whose centre is its origin. */
+  /** Places a mesh, whose centre is its origin: three rows of a rotation, and where the centre is. */
   place(slot, rotation, position) {
     const [x, y, z] = rotation;
     const { group } = this.slots[slot];
@@ -82,9 +84,13 @@ export class Picture {
     group.matrixWorldNeedsUpdate = true;
   }
 
-  look({ target, theta, phi, distance }) {
+  /** theta: about the vertical, z; phi: above the horizon; distance: that of a picture that is not narrower than high. */
+  look(view) {
+    this.view = view;
     const { camera } = this;
-    const out = [Math.cos(phi) * Math.sin(theta), Math.sin(phi), Math.cos(phi) * Math.cos(theta)];
+    const { target, theta, phi } = view;
+    const distance = view.distance * Math.max(1, 1 / camera.aspect);
+    const out = [Math.cos(phi) * Math.cos(theta), Math.cos(phi) * Math.sin(theta), Math.sin(phi)];
     camera.near = distance / 100;
     camera.far = distance * 100;
     camera.position.set(...target.map((x, i) => x + distance * out[i]));
@@ -111,7 +117,7 @@ export class Picture {
     const corners = new Float32Array(9 * triangles.length);
     triangles.forEach((triangle, i) => corners.set(positions.subarray(9 * triangle, 9 * triangle + 9), 9 * i));
     touching.geometry.dispose();
-    touching.geometry = lines_of(corners);
+    touching.geometry = geometry_of(corners);
     touching.visible = triangles.length > 0;
   }
 
@@ -129,11 +135,11 @@ export class Picture {
   }
 
   add_lines(name, ends) {
-    if (ends.length > 0) this.#mark(new THREE.LineSegments(lines_of(ends.flat()), this.materials[name]));
+    if (ends.length > 0) this.#mark(new THREE.LineSegments(geometry_of(ends.flat(Infinity)), this.materials[name]));
   }
 
-  add_points(places) {
-    if (places.length > 0) this.#mark(new THREE.Points(lines_of(places.flat()), this.points));
+  add_points(name, places) {
+    if (places.length > 0) this.#mark(new THREE.Points(geometry_of(places.flat()), this.dots[name]));
   }
 
   /** boxes: with corners that `to_world` takes to where they are. */

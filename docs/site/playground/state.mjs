@@ -1,8 +1,8 @@
 // The state of the page, which the address after # holds.
 export const START = {
   a: "cow.obj", b: "cow.obj", la: 0, lb: 0,
-  position: [0.45, 0.2, 0.1], q: [0, 0.3826834323650898, 0, 0.9238795325112867],
-  view: { theta: 0.6, phi: 0.35, distance: 0 },
+  position: [0.35, 0.4, 0.05], q: [0, 0, 0.3826834323650898, 0.9238795325112867],
+  view: { theta: 0.9, phi: 0.35, distance: 0 },
   contacts: true, manifolds: true, distance: true, tree: false, mode: "move",
 };
 const SHOWN = { contacts: "c", manifolds: "m", distance: "d", tree: "t" };

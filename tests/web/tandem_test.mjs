@@ -1,8 +1,10 @@
 // tandem.mjs under Node: its answers are those of the native library, byte for byte.
 // Usage: node --test tests/web/tandem_test.mjs, after scripts/build_web. Environment: TANDEM_NATIVE_BUILD, TANDEM_MESHES.
 import assert from "node:assert/strict";
-import { readFileSync } from "node:fs";
-import { basename, extname, join } from "node:path";
+import { spawnSync } from "node:child_process";
+import { mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
+import { tmpdir } from "node:os";
+import { basename, join } from "node:path";
 import { before, test } from "node:test";
 
 import * as native from "./native.mjs";
@@ -180,9 +182,7 @@ test("wrong calls give errors with names, and change nothing", () => {
   triangle.delete();
 });
 
-test("numbers of a text file are read as the native reader does", { skip: native.missing }, async () => {
-  const { mkdtempSync, rmSync, writeFileSync } = await import("node:fs");
-  const { tmpdir } = await import("node:os");
+test("numbers of a text file are read as the native reader does", { skip: native.missing }, () => {
   const folder = mkdtempSync(join(tmpdir(), "tandem-numbers-"));
   const random = randoms(3);
   const digits = (count) => Array.from({ length: count }, () => Math.floor(random() * 10)).join("");
@@ -191,7 +191,7 @@ test("numbers of a text file are read as the native reader does", { skip: native
   const lines = [];
   for (let i = 0; i < words.length; i += 3) lines.push(`v ${words.slice(i, i + 3).join(" ")}`);
   for (let i = 1; i + 2 <= words.length / 3; ++i) lines.push(`f ${i} ${i + 1} ${i + 2}`);
-  const path = join(folder, `numbers${extname("a.obj")}`);
+  const path = join(folder, "numbers.obj");
   writeFileSync(path, lines.join("\n"));
   const theirs = readFileSync(native.bvh_of(path));
   const ours = built(path, JSON.stringify(tandem.Asset.from_bytes(theirs).provenance));
@@ -216,4 +216,27 @@ test("memory does not grow over 1,000 queries, nor over 200 assets", () => {
   for (let i = 0; i < 100; ++i) once();
   for (let i = 0; i < 200; ++i) asset_again();
   assert.equal(bytes(), after_one);
+});
+
+test("what docs/web.md shows runs", async (context) => {
+  const [, snippet] = /```js\n(.*?)```/s.exec(readFileSync(join(native.ROOT, "docs/web.md"), "utf-8"));
+  const path = join(native.ROOT, "build/web/tandem/snippet.mjs");
+  const said = [];
+  context.mock.method(globalThis, "fetch", async (name) => new Response(readFileSync(native.mesh_path(name))));
+  context.mock.method(console, "log", (...words) => said.push(words));
+  writeFileSync(path, snippet);
+  try {
+    await import(path);
+  } finally {
+    rmSync(path);
+  }
+  assert.ok(said.length > 1 && said.at(-1)[1].length > 0);
+});
+
+const has_compiler = spawnSync("tsc", ["--version"]).status === 0;
+test("the types allow what the module has", { skip: !has_compiler && "there is no tsc (node-typescript)" }, () => {
+  const options = ["--noEmit", "--strict", "--target", "es2022", "--module", "node16", "--moduleResolution", "node16", "--lib", "es2022,dom,esnext"];
+  const done = spawnSync("tsc", [...options, join(native.ROOT, "tests/web/types.mts")], { encoding: "utf-8" });
+  assert.equal(done.stdout, "");
+  assert.equal(done.status, 0);
 });

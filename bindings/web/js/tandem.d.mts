@@ -1,11 +1,11 @@
 import type {
   ClosestCounters, ClosestPoint, Contact, ContactCounters, Containment, ContainmentCounters, Distance, DistanceCounters, FormerNearest, Impact,
   ImpactCounters, Manifold, ManifoldCounters, ManifoldPoint, Motion, ObjectPair, RayCounters, RayHit, ToleranceCounters, Verdict,
-} from "./rows.js";
+} from "./rows.mjs";
 
 export type {
   ClosestPoint, Contact, Containment, Distance, Impact, Manifold, ManifoldPoint, Motion, ObjectPair, RayHit, Verdict,
-} from "./rows.js";
+} from "./rows.mjs";
 
 /** A status of the library that is not success. */
 export class TandemError extends Error {

@@ -110,7 +110,8 @@ std::span<const Element> elements(const unsigned char* data, std::span<const Sec
                                   SectionKind kind, std::uint32_t level = 0) {
   for (const Section& section : sections) {
     if (section.kind == kind && section.level == level) {
-      return {reinterpret_cast<const Element*>(data + section.offset), section.count};
+      return {reinterpret_cast<const Element*>(data + section.offset),
+              static_cast<std::size_t>(section.count)};
     }
   }
   return {};

@@ -96,14 +96,14 @@ def read(path):
     return Header(constants, [name for _, name in _HANDLE.findall(text)], structs, functions)
 
 
-def layouts(structs):
-    """{name of a struct: (bytes, alignment, {field: offset})} by the rule of C: each field at a multiple of its alignment."""
+def layouts(structs, pointer=8):
+    """{name of a struct: (bytes, alignment, {field: offset})} by the rule of C: each field at a multiple of its alignment. pointer: the bytes of one."""
     known = {}
     for struct in structs:
         end, widest, offsets = 0, 1, {}
         for field in struct.fields:
-            if isinstance(field.type, Function) or field.type.endswith("*"):
-                size = align = 8
+            if isinstance(field.type, Function) or field.type.endswith("*") or field.type == "size_t":
+                size = align = pointer
             elif field.type in known:
                 size, align, _ = known[field.type]
             else:

@@ -12,30 +12,16 @@ namespace {
 
 namespace nb = nanobind;
 
-// A mesh file of triangles and quads that takes no package to read.
-struct PlainMesh {
-  build::ReadResult read;
-  build::TriangleMesh triangles;
-  std::string needs_tools;  // why the mesh tools are needed; empty: they are not
-};
+using build::PlainMesh;
 
 PlainMesh read_plain(const std::string& path) {
-  PlainMesh found;
   build::InputFile file;
   const std::string problem = file.open(path);
   if (!problem.empty()) return {build::read_failure(problem), {}, {}};
   const build::MeshKind kind = build::kind_of(path, file.head());
   if (!kind.refusal.empty()) return {build::read_failure(kind.refusal), {}, {}};
   if (kind.reader == nullptr) return {build::read_failure(""), {}, "it is no OBJ, PLY, STL or OFF file"};
-  found.read = build::read_with(kind.reader, file, {});
-  if (!found.read.ok) return found;
-  if (const auto face = build::first_face_beyond_quads(found.read.mesh)) {
-    found.needs_tools = "face " + std::to_string(*face) + " has more than four corners";
-    return found;
-  }
-  build::CleanReport report;
-  found.triangles = build::triangulate(found.read.mesh, report, {});
-  return found;
+  return build::plain_mesh_of(build::read_with(kind.reader, file, {}));
 }
 
 // Rows as of rows_of(), or none and why, and whether the mesh tools could read it.

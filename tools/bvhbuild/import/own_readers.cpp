@@ -67,4 +67,16 @@ ReadResult read_with(ReadBytes reader, InputFile& file, const ReadLimits& limits
   return problem.empty() ? reader(file.bytes()) : read_failure(problem);
 }
 
+PlainMesh plain_mesh_of(ReadResult read) {
+  PlainMesh mesh{std::move(read), {}, {}};
+  if (!mesh.read.ok) return mesh;
+  if (const auto face = first_face_beyond_quads(mesh.read.mesh)) {
+    mesh.needs_tools = "face " + std::to_string(*face) + " has more than four corners";
+    return mesh;
+  }
+  CleanReport report;
+  mesh.triangles = triangulate(mesh.read.mesh, report, {});
+  return mesh;
+}
+
 }  // namespace tandem::build

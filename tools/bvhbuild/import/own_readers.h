@@ -26,4 +26,14 @@ std::string load(InputFile& file, const ReadLimits& limits);
 /// Reads an open file with one of our readers.
 ReadResult read_with(ReadBytes reader, InputFile& file, const ReadLimits& limits);
 
+/// A mesh file of triangles and quads that takes no package to read.
+struct PlainMesh {
+  ReadResult read;
+  TriangleMesh triangles;
+  std::string needs_tools;  ///< why it takes packages after all; empty: it does not
+};
+
+/// Splits the quads of a mesh that was read, and says of one with larger faces which is the first of them.
+PlainMesh plain_mesh_of(ReadResult read);
+
 }  // namespace tandem::build

@@ -467,8 +467,9 @@ class PlyReader {
     if (kind_ != ElementKind::face) return;
     const auto corners = std::find(roles_.begin(), roles_.end(), Role::corners) - roles_.begin();
     const PlyType type = element.properties[static_cast<std::size_t>(corners)].type;
-    mesh_.reserve_faces(element.count,
-                        std::min(3 * element.count, values_.room() / Values::least_item_bytes(type)));
+    mesh_.reserve_faces(
+        element.count,
+        std::min<std::uint64_t>(3 * element.count, values_.room() / Values::least_item_bytes(type)));
   }
 
   bool record() {

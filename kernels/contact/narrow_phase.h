@@ -20,12 +20,12 @@ struct PairTask {
   std::uint32_t pair = 0;
   QueryMode mode = QueryMode::exact;
   bool first_contact_only = false;
-  bool self;              ///< a and b are one instance: every two triangles once, none with itself
-  bool in_frame;          ///< float32 in a's frame can take the pair; else what follows has no meaning
-  RelativePose b_in_a;    ///< with slack for what is within reach too
-  float frame_error;      ///< see frame_test.h; with what is within reach too
-  bool on_grid = false;   ///< lie_on_grid()
-  double within = 0;      ///< triangles at most so far apart count; 0: those that meet
+  bool self;             ///< a and b are one instance: every two triangles once, none with itself
+  bool in_frame;         ///< float32 in a's frame can take the pair; else what follows has no meaning
+  RelativePose b_in_a;   ///< with slack for what is within reach too
+  float frame_error;     ///< see frame_test.h; with what is within reach too
+  bool on_grid = false;  ///< lie_on_grid()
+  double within = 0;     ///< triangles at most so far apart count; 0: those that meet
   distance::FrameClearance clearance = {};            ///< where that is not 0
   std::uint64_t most_candidates = ~std::uint64_t{0};  ///< of clearance: the walk gives up after so many
   /// Where both are one instance, the neighbours that the ways without neighbours leave out; null: none.

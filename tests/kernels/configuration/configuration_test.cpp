@@ -33,6 +33,7 @@ class CpuDevice final : public SceneDevice {
   }
 
   Status deform(SceneState&, std::uint32_t, std::span<const float>) override { return Status::kBadOption; }
+  Status deform(SceneState&, std::uint32_t, std::span<const double>) override { return Status::kBadOption; }
   Status find(SceneState&, const ClosestOptions&,
               const DeviceAnswer<ClosestPoint, ClosestCounters>&) override {
     return Status::kBadOption;

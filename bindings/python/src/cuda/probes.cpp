@@ -93,7 +93,8 @@ nb::tuple ProbeStep::wait(const Stream* stream) {
   const OnDevice current(assets_.device());
   synchronize(stream);
   tandem_gpu_probe_report report;
-  check(tandem_gpu_probe_query_get_report(query_.get(), &report), report.where);
+  const tandem_status status = tandem_gpu_probe_query_get_report(query_.get(), &report);
+  check(status, report.where);
   const tandem_gpu_probe_capacity& needed = report.needed;
   return nb::make_tuple(report.complete != 0, report.rows, needed.hits, needed.words);
 }

@@ -92,9 +92,7 @@ nb::tuple ProbeStep::wait(const Stream* stream) {
   const Turn turn(busy_, kBusy);
   const OnDevice current(assets_.device());
   synchronize(stream);
-  tandem_gpu_probe_report report;
-  const tandem_status status = tandem_gpu_probe_query_get_report(query_.get(), &report);
-  check(status, report.where);
+  const auto report = checked_report(tandem_gpu_probe_query_get_report, query_.get());
   const tandem_gpu_probe_capacity& needed = report.needed;
   return nb::make_tuple(report.complete != 0, report.rows, needed.hits, needed.words);
 }

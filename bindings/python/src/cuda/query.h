@@ -16,6 +16,15 @@ struct Destroy {
   }
 };
 
+/// Returns the report of a call that the stream has passed. Throws what is wrong, with the number to blame.
+template <typename Of, typename Report>
+Report checked_report(tandem_status (*get_report)(const Of*, Report*), const Of* handle) {
+  Report report = {};
+  const tandem_status status = get_report(handle, &report);
+  check(status, report.where);
+  return report;
+}
+
 /// A question's handles. Arrays of results lie in a handle's memory and keep it: it is used again when the
 /// last of them is gone, and until then a call takes another.
 template <auto create, auto destroy, auto set_assets, auto get_report>

@@ -138,12 +138,9 @@ nb::tuple Step::wait(nb::handle given, const Stream* stream) {
   if (!given.is_none()) {
     pairs = nb::cast<const Pairs&>(given).count();
   } else {
-    tandem_gpu_broad_phase_report near;
-    check(tandem_gpu_broad_phase_get_report(broad_phase_.get(), &near), near.where);
-    pairs = near.found;
+    pairs = checked_report(tandem_gpu_broad_phase_get_report, broad_phase_.get()).found;
   }
-  tandem_gpu_query_report report;
-  check(tandem_gpu_contact_query_get_report(contacts_.get(), &report), report.where);
+  const auto report = checked_report(tandem_gpu_contact_query_get_report, contacts_.get());
   tandem_gpu_manifold_report made = {};
   made.complete = 1;
   if (manifolds_ != nullptr && report.complete != 0)

@@ -294,6 +294,10 @@ def test_queued_manifolds_are_those_of_the_cpu(torch, assets):
     assert report["complete"] and (report["manifolds"], report["points"]) == (len(made.manifolds), len(made.points))
     assert queued.manifolds.numpy()[:len(made.manifolds)].tobytes() == made.manifolds.tobytes()
     assert queued.points.numpy()[:len(made.points)].tobytes() == made.points.tobytes()
+    pose[5] *= 1.1
+    with pytest.raises(tandem.Error) as caught:
+        query.enqueue(query.instances(torch.from_numpy(asset).cuda(), torch.from_numpy(pose).cuda())).wait()
+    assert (caught.value.name, caught.value.where) == ("PoseNotRigid", 5)
 
 
 @needs_gpu

@@ -73,6 +73,8 @@ TEST(WorkerThreads, AreWaitedForWhereTheyWorkLonger) {
   }
 }
 
+#if defined(__linux__)
+
 /// Files of a made-up machine.
 class Machine {
  public:
@@ -93,8 +95,6 @@ class Machine {
 };
 
 constexpr const char* kMeminfo = "MemTotal:  9000 kB\nMemFree:  10 kB\nMemAvailable:    8000 kB\n";
-
-#if defined(__linux__)
 
 TEST(AvailableMemory, IsTheMachinesWhereThereAreNoGroups) {
   EXPECT_EQ(Machine("plain").with("/proc/meminfo", kMeminfo).available(), 8000u * 1024);
@@ -126,11 +126,11 @@ TEST(AvailableMemory, OfThisMachineIsSomethingOrUnknown) {
   EXPECT_GT(available_memory(), std::uint64_t{1} << 20);
 }
 
-#endif
-
 TEST(AvailableMemory, IsUnknownWhereNothingTells) {
   EXPECT_EQ(Machine("empty").available(), UINT64_MAX);
 }
+
+#endif
 
 }  // namespace
 }  // namespace tandem

@@ -265,7 +265,7 @@ TANDEM_HD inline auto meets_box(const WorldRayOf<Real>& ray, const double* lo, c
   return leaves_part(near, far, first, last) & enters;
 }
 
-/// As many float32 numbers as a Real has float64 numbers.
+/// This has as many float32 numbers as a Real has float64 numbers.
 template <typename Real>
 struct SingleOf;
 template <>

@@ -19,7 +19,8 @@ struct PlainReal {
 
 #ifdef TANDEM_HAVE_LANES
 
-/// As many float64 numbers as a vector of the machine has: GCC takes wider ones apart where it selects.
+/// This has as many float64 numbers as a vector of the machine has: GCC takes wider ones apart where it
+/// selects.
 template <int kCount>
 struct Reals {
   using Doubles = DoubleLanes<kCount>;

@@ -66,7 +66,7 @@ class Reference:
             for entity in entities:
                 self.name(entity, self.places[header])
 
-    # What there is, and where.
+    # This tells what there is, and where.
 
     def entities_of(self, file):
         """Types and members of a header in the order of its lines; overloads of a function are one entity, a list."""

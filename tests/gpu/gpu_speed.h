@@ -8,7 +8,7 @@
 #include "tandem/formats/gpu_stream.h"
 #include "tandem/formats/status.h"
 
-// What programs that measure on a GPU share. They end with 77 where there is none, and with 1 at any other
+// Programs that measure on a GPU share this. They end with 77 where there is none, and with 1 at any other
 // error.
 namespace tandem {
 

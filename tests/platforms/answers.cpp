@@ -29,7 +29,7 @@ void print(const char* question, const Row* rows, std::size_t count) {
               static_cast<unsigned long long>(hash));
 }
 
-/// The same numbers everywhere, from -1 to 1.
+/// These numbers, from -1 to 1, are the same everywhere.
 class Numbers {
  public:
   double operator()() { return static_cast<double>(random_() >> 11) * 0x1p-52 - 1; }

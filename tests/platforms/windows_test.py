@@ -20,7 +20,7 @@ BUILD = pathlib.Path(os.environ["TANDEM_BUILD"])
 NATIVE = pathlib.Path(os.environ["TANDEM_NATIVE_BUILD"])
 MESHES = pathlib.Path(os.environ.get("TANDEM_MESHES", SOURCE_DIR.parent / "shared" / "meshes"))
 BVHBUILD, BVHINFO, ANSWERS, VARIANTS = "tools/bvhbuild/bvhbuild", "tools/bvhinfo/bvhinfo", "tests/platforms/answers", "tests/kernels/variant_check"
-# What Windows itself has.
+# Windows itself has these.
 SYSTEM = {"kernel32.dll", "msvcrt.dll", "psapi.dll", "user32.dll", "advapi32.dll", "shell32.dll"}
 SKIPPED = 77
 UNREADABLE_INPUT, UNWRITABLE_OUTPUT = 2, 4

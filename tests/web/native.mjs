@@ -27,7 +27,7 @@ export function bvh_of(mesh, ...options) {
   return path;
 }
 
-/** What the C library answers of two .bvh files at poses: see answers.c. */
+/** Returns what the C library answers about two .bvh files at poses: see answers.c. */
 export function answers(a, b, poses) {
   if (program === null) {
     program = join(folder, "answers");

@@ -4,7 +4,7 @@
 #include <span>
 #include <string>
 
-/// What write_whole_file() does to files, as each system does it: file_writing_posix.cpp,
+/// write_whole_file() does this to files, as each system does it: file_writing_posix.cpp,
 /// file_writing_windows.cpp. Results are empty, or the reason of the failure.
 namespace tandem {
 

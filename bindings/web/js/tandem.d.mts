@@ -13,7 +13,7 @@ export class TandemError extends Error {
   readonly status: number;
   /** Such as "PoseNotRigid". */
   readonly status_name: string;
-  /** What `where` counts, such as "instance". */
+  /** This names what `where` counts, such as "instance". */
   readonly subject: string | null;
   /** The number of the row to blame. */
   readonly where: number | null;
@@ -66,7 +66,7 @@ export interface Level {
   readonly triangle_count: number;
   readonly block_count: number;
   readonly leaf_block_count: number;
-  /** Of the tree, in blocks. */
+  /** This is the depth of the tree, in blocks. */
   readonly depth: number;
   /** No point of this surface or of the file's finest is farther from the other. */
   readonly error_bound: number;
@@ -112,7 +112,7 @@ export class Asset {
   readonly first_level: number;
   readonly origin: number[];
   readonly bounds: Box;
-  /** As bvhinfo prints it. */
+  /** This is the text that bvhinfo prints. */
   readonly hash: string;
   readonly file_bytes: number;
   readonly source_faces: number;

@@ -1,7 +1,7 @@
 #pragma once
 #include "tandem/tandem.h"
 
-/// What tandem.mjs needs beside the C interface.
+/// This is what tandem.mjs needs beside the C interface.
 extern "C" {
 
 /// A mesh file that was read, or the reason why it could not be.

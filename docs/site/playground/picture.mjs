@@ -1,4 +1,4 @@
-// What is drawn, by three.js.
+// This is what is drawn, by three.js.
 import * as THREE from "./three/three.module.js";
 
 const colour_of = (name) => new THREE.Color(getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim());

@@ -22,7 +22,7 @@ export function pose_about(centre, q, position) {
   return { rotation, translation: position.map((x, row) => x - rotation[row].reduce((sum, part, k) => sum + part * centre[k], 0)) };
 }
 
-/** Where a point of a mesh is in the world. */
+/** Returns where a point of a mesh is in the world. */
 export function placed(pose, point) {
   return pose.rotation.map((row, i) => row.reduce((sum, part, k) => sum + part * point[k], 0) + pose.translation[i]);
 }

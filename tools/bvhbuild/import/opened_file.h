@@ -5,7 +5,7 @@
 #include <system_error>
 #include <utility>
 
-/// What InputFile does, as each system does it: opened_file_posix.cpp, opened_file_windows.cpp.
+/// InputFile does this, as each system does it: opened_file_posix.cpp, opened_file_windows.cpp.
 namespace tandem::build {
 
 enum class FileKind { regular, folder, other };

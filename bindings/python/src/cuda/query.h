@@ -157,7 +157,7 @@ class Query {
   nb::tuple verdicts(nb::object instances, double tolerance, nb::object pairs, const GpuFilter* filter,
                      const Stream& stream);
 
-  /// Of: Points or Rays.
+  /// This is about Points or Rays, by Of.
   template <typename Of>
   Rows probe(nb::object instances, const Of& probes, const Stream& stream);
 

@@ -61,7 +61,7 @@ struct GpuAssetBounds {
 /// The numbers in which positions of a deforming body may be given.
 enum class PositionTypes : std::uint8_t { float32, float32_and_float64 };
 
-/// What queries need to know of each asset of a list, and what a broad phase needs, in GPU memory.
+/// These records, in GPU memory, hold what queries and a broad phase need to know of each asset of a list.
 struct GpuAssetRecords {
   GpuAsset* assets = nullptr;
   AssetBounds* bounds = nullptr;

@@ -178,7 +178,7 @@ void expect_found(Found found, const Json& expected) {
   for (const auto& [counter, count] : counters.items())
     EXPECT_EQ(found.counters.at(counter), count) << counter;
   if (expected.contains("hash")) {
-    EXPECT_EQ(hash_of(found), expected["hash"]);
+    EXPECT_EQ(hash_of(found), expected["hash"].get<std::string>());
   }
 }
 

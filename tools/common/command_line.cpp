@@ -2,7 +2,6 @@
 
 #include <CLI/CLI.hpp>
 #include <array>
-#include <charconv>
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
@@ -13,6 +12,7 @@
 #include "path_text.h"
 #include "printable.h"
 #include "process.h"
+#include "real_from_text.h"
 
 namespace tandem {
 namespace {
@@ -46,7 +46,7 @@ CLI::Validator validator(const Check& check) {
 std::optional<double> number_in(const std::string& text) {
   double number = 0;
   const char* begin = text.data() + (text.starts_with('+') ? 1 : 0);
-  const auto [end, error] = std::from_chars(begin, text.data() + text.size(), number);
+  const auto [end, error] = real_from_text(begin, text.data() + text.size(), number);
   return error == std::errc() && end == text.data() + text.size() ? std::optional(number) : std::nullopt;
 }
 

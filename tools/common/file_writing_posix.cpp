@@ -2,6 +2,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <csignal>
@@ -55,14 +56,23 @@ class SignalGuard {
   std::array<struct sigaction, kSignals.size()> previous_{};
 };
 
-// Writes everything; 0 or an error number.
+// Writes everything; 0 or an error number. macOS refuses to write 2 GiB at once.
 int write_all(int file, std::span<const std::byte> bytes) {
+  constexpr std::size_t kMostAtOnce = std::size_t{1} << 30;
   while (!bytes.empty()) {
-    const ssize_t written = ::write(file, bytes.data(), bytes.size());
+    const ssize_t written = ::write(file, bytes.data(), std::min(bytes.size(), kMostAtOnce));
     if (written < 0 && errno != EINTR) return errno;
     if (written > 0) bytes = bytes.subspan(static_cast<std::size_t>(written));
   }
   return 0;
+}
+
+// Brings what was written to the disk; 0 or an error number. On macOS fsync() stops at the disk's own memory.
+int flush_to_disk(int file) {
+#if defined(F_FULLFSYNC)
+  if (::fcntl(file, F_FULLFSYNC) == 0) return 0;  // else a file system that has only fsync()
+#endif
+  return ::fsync(file) == 0 ? 0 : errno;
 }
 
 // A file beside the target that no other process writes to. File systems take names of 255 bytes.
@@ -101,7 +111,7 @@ std::string write_and_rename(const fs::path& target, std::span<const std::byte> 
   if (file < 0) return reason_of(errno);
   int error = copy_permissions(target, file);
   if (error == 0) error = write_all(file, bytes);
-  if (error == 0 && replace && ::fsync(file) != 0) error = errno;
+  if (error == 0 && replace) error = flush_to_disk(file);
   if (::close(file) != 0 && error == 0) error = errno;
   if (error == 0 && replace && ::rename(temporary.c_str(), target.c_str()) != 0) error = errno;
   if (error != 0 || !replace) ::unlink(temporary.c_str());

@@ -46,17 +46,7 @@ bool equal(const Some& some, const Others& others) {
 }  // namespace std::ranges
 #endif
 
-// libc++ reads float64 numbers from version 20 on, and writes them from version 14 on.
-#if defined(_LIBCPP_VERSION) && _LIBCPP_VERSION < 200000
-#define TANDEM_READS_REALS 1
-#include <charconv>
-
-namespace std {
-
-from_chars_result from_chars(const char* first, const char* last, double& value);
-
-}  // namespace std
-#endif
+// libc++ writes float64 numbers from version 14 on.
 #if defined(_LIBCPP_VERSION) && _LIBCPP_VERSION < 14000
 #define TANDEM_WRITES_REALS 1
 #include <charconv>

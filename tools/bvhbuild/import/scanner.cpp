@@ -1,10 +1,11 @@
 #include "scanner.h"
 
 #include <algorithm>
-#include <charconv>
 #include <limits>
 #include <string_view>
 #include <system_error>
+
+#include "common/real_from_text.h"
 
 namespace tandem::build {
 namespace {
@@ -42,8 +43,8 @@ const char* parse_windows_special(const char* first, const char* last, double& v
   return nullptr;
 }
 
-// The power of ten of the first significant digit, for a number that from_chars found too large or too small:
-// only its sign counts, so that an exponent that fits in no integer may saturate.
+// The power of ten of the first significant digit, for a number that real_from_text() found too large or too
+// small: only its sign counts, so that an exponent that fits in no integer may saturate.
 bool is_beyond_one(const char* first, const char* last) {
   std::int64_t power = 0;
   bool significant = false;
@@ -71,7 +72,7 @@ const char* parse_real(const char* first, const char* last, double& value) {
   if (first == last || *first == '-') return nullptr;
 
   double magnitude = 0;
-  auto [end, status] = std::from_chars(first, last, magnitude);
+  auto [end, status] = real_from_text(first, last, magnitude);
   if (status == std::errc::invalid_argument) return nullptr;
   if (status == std::errc::result_out_of_range)
     magnitude = is_beyond_one(first, end) ? std::numeric_limits<double>::infinity() : 0.0;

@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <atomic>
-#include <charconv>
 #include <cmath>
 #include <optional>
 
 #include "collapses.h"
+#include "common/real_from_text.h"
 #include "levels/hausdorff.h"
 #include "levels/nearest_triangle.h"
 #include "parallel/parallel.h"
@@ -20,7 +20,7 @@ std::optional<LevelError> parse(std::string_view word) {
   const bool of_diagonal = word.ends_with('%');
   if (of_diagonal) word.remove_suffix(1);
   double value = 0;
-  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
+  const auto [end, error] = real_from_text(word.data(), word.data() + word.size(), value);
   if (error != std::errc() || end != word.data() + word.size()) return std::nullopt;
   if (!std::isfinite(value) || !(value > 0)) return std::nullopt;
   return LevelError{of_diagonal ? value / 100 : value, of_diagonal};

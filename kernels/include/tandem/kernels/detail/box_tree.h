@@ -46,7 +46,9 @@ struct BoxTree {
 
   bool reserve(std::size_t boxes, const PairFilter& filter);
   void clear() {
-    items.clear(), groups.clear(), kinds.clear();
+    items.clear();
+    groups.clear();
+    kinds.clear();
     levels = 0;
   }
   std::size_t count() const { return items.size(); }

@@ -2,6 +2,12 @@ include(GNUInstallDirs)
 # Components of the installation: dev, but for shared libraries (libs, cuda), commands (tools) and the Python package (python).
 set(CMAKE_INSTALL_DEFAULT_COMPONENT_NAME dev)
 
+# CMake asks the Mac that it runs on whether it knows @rpath; all do since 2007.
+if(APPLE AND CMAKE_CROSSCOMPILING)
+  set(CMAKE_SHARED_LIBRARY_RUNTIME_C_FLAG "-Wl,-rpath,")
+  set(CMAKE_SHARED_LIBRARY_RUNTIME_CXX_FLAG "-Wl,-rpath,")
+endif()
+
 # What a system does in its own way is in a file for each kind of system: file_bytes_posix.cpp, file_bytes_windows.cpp.
 set(TANDEM_PLATFORM posix)
 if(WIN32)
@@ -28,6 +34,10 @@ endmacro()
 # on whether a compiler fuses a multiply and an add. Headers that are not installed are spelled from the project's
 # root on, such as "kernels/geometry/triangle_test.h".
 function(tandem_flags target)
+  # A library for macOS exports what the header marks; elsewhere a list of symbols or the mark for DLLs does the same.
+  if(APPLE)
+    set_target_properties(${target} PROPERTIES CXX_VISIBILITY_PRESET hidden VISIBILITY_INLINES_HIDDEN ON)
+  endif()
   target_include_directories(${target} PRIVATE ${PROJECT_SOURCE_DIR})
   target_compile_options(${target} PRIVATE
     $<$<COMPILE_LANGUAGE:CXX>:-Wall -Wextra -Wshadow -Wconversion -Wno-sign-conversion -ffp-contract=off>)
@@ -39,9 +49,13 @@ function(tandem_flags target)
   if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
     target_compile_options(${target} PRIVATE $<$<AND:$<COMPILE_LANGUAGE:CXX>,$<BOOL:$<TARGET_PROPERTY:UNITY_BUILD>>>:-Wno-subobject-linkage>)
   endif()
+  # Truth values are combined without branches where both are cheap.
+  if(CMAKE_CXX_COMPILER_ID MATCHES "Clang")
+    target_compile_options(${target} PRIVATE $<$<COMPILE_LANGUAGE:CXX>:-Wno-bitwise-instead-of-logical>)
+  endif()
   # Memory ends at 2 GiB there, so that 64-bit numbers that count bytes or elements of it fit in 32 bits.
   if(EMSCRIPTEN)
-    target_compile_options(${target} PRIVATE -Wno-shorten-64-to-32 -Wno-bitwise-instead-of-logical -Wno-unused-function -Wno-unneeded-internal-declaration)
+    target_compile_options(${target} PRIVATE -Wno-shorten-64-to-32 -Wno-unused-function -Wno-unneeded-internal-declaration)
   endif()
   if(TANDEM_WARNINGS_AS_ERRORS)
     target_compile_options(${target} PRIVATE $<$<COMPILE_LANGUAGE:CXX>:-Werror>)
@@ -72,11 +86,11 @@ function(tandem_library name)
   add_library(tandem::${name} ALIAS ${target})
   set_target_properties(${target} PROPERTIES EXPORT_NAME ${name})
   target_compile_features(${target} ${scope} cxx_std_20)
-  target_include_directories(${target} ${scope}
-    $<BUILD_INTERFACE:${CMAKE_CURRENT_SOURCE_DIR}/include> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
+  target_include_directories(${target} ${scope} $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
   target_link_libraries(${target} ${scope} ${ARG_DEPENDS})
   install(TARGETS ${target} EXPORT tandemTargets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
   if(EXISTS ${CMAKE_CURRENT_SOURCE_DIR}/include)
+    target_include_directories(${target} ${scope} $<BUILD_INTERFACE:${CMAKE_CURRENT_SOURCE_DIR}/include>)
     install(DIRECTORY include/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
   endif()
 endfunction()
@@ -87,7 +101,7 @@ macro(tandem_lane_variants name)
   if(CMAKE_SYSTEM_PROCESSOR MATCHES "^(x86_64|AMD64|amd64)$")
     set_source_files_properties(variants/avx2.cpp PROPERTIES COMPILE_OPTIONS "-mavx2")
     set_source_files_properties(variants/avx512.cpp PROPERTIES
-      COMPILE_OPTIONS "-mavx512f;-mavx512vl;-mavx512dq;-mavx512bw;-mprefer-vector-width=512")
+      COMPILE_OPTIONS "-mavx512f;-mavx512vl;-mavx512dq;-mavx512bw;-mprefer-vector-width=512;${TANDEM_AVX512_OPTIONS}")
     target_compile_definitions(tandem_${name} PRIVATE TANDEM_X86_LANES=1)
   endif()
 endmacro()

@@ -41,23 +41,60 @@ Found read(const std::string& text, Reader reader) {
 
 std::string digits(std::mt19937& random, std::uint_fast32_t most) {
   std::string text;
-  for (std::uint_fast32_t left = random() % (most + 1); left > 0; --left) text += static_cast<char>('0' + random() % 10);
+  for (std::uint_fast32_t left = random() % (most + 1); left > 0; --left)
+    text += static_cast<char>('0' + random() % 10);
   return text;
 }
 
 TEST(RealByStrtod, FindsWhatTheLibraryFindsInOddText) {
-  for (const char* text :
-       {"", "-", "--1", "+1", ".", "-.", ".5", "5.", "-0", "0x10", "1e", "1e+", "1e-", "1E5", "1e+5x", "1.5.5", "inf", "-INF",
-        "infinity", "infinit", "in", "nan", "-nan", "nan(ind)", "nan(", "nan(a b)", "NaN()", "1e400", "-1e400",
-        "1e-400", "0e400", "0e-400", "4.9e-324", "2e-324", "2.2250738585072011e-308", "1.7976931348623159e308",
-        " 1", "1 ", "e5", "9007199254740993"})
+  for (const char* text : {"",
+                           "-",
+                           "--1",
+                           "+1",
+                           ".",
+                           "-.",
+                           ".5",
+                           "5.",
+                           "-0",
+                           "0x10",
+                           "1e",
+                           "1e+",
+                           "1e-",
+                           "1E5",
+                           "1e+5x",
+                           "1.5.5",
+                           "inf",
+                           "-INF",
+                           "infinity",
+                           "infinit",
+                           "in",
+                           "nan",
+                           "-nan",
+                           "nan(ind)",
+                           "nan(",
+                           "nan(a b)",
+                           "NaN()",
+                           "1e400",
+                           "-1e400",
+                           "1e-400",
+                           "0e400",
+                           "0e-400",
+                           "4.9e-324",
+                           "2e-324",
+                           "2.2250738585072011e-308",
+                           "1.7976931348623159e308",
+                           " 1",
+                           "1 ",
+                           "e5",
+                           "9007199254740993"})
     EXPECT_TRUE(agree(text));
 }
 
 TEST(RealByStrtod, FindsWhatTheLibraryFindsInRandomNumbers) {
   std::mt19937 random(1);
   for (int i = 0; i < 100000; ++i) {
-    std::string text = (random() % 2 ? "-" : "") + digits(random, 20) + (random() % 4 ? "." : "") + digits(random, 90);
+    std::string text =
+        (random() % 2 ? "-" : "") + digits(random, 20) + (random() % 4 ? "." : "") + digits(random, 90);
     if (random() % 2) text += "e" + std::to_string(static_cast<int>(random() % 700) - 350);
     ASSERT_TRUE(agree(text));
   }

@@ -15,14 +15,11 @@ import tempfile
 import time
 import unittest
 
-SOURCE_DIR = pathlib.Path(os.environ["TANDEM_SOURCE_DIR"])
-BUILD = pathlib.Path(os.environ["TANDEM_BUILD"])
+from linked_programs import BUILD, SKIPPED, SOURCE_DIR, LinkedPrograms, run_tests
+
 NATIVE = pathlib.Path(os.environ["TANDEM_NATIVE_BUILD"])
 MESHES = pathlib.Path(os.environ.get("TANDEM_MESHES", SOURCE_DIR.parent / "shared" / "meshes"))
 BVHBUILD, BVHINFO, ANSWERS, VARIANTS = "tools/bvhbuild/bvhbuild", "tools/bvhinfo/bvhinfo", "tests/platforms/answers", "tests/kernels/variant_check"
-# Windows itself has these.
-SYSTEM = {"kernel32.dll", "msvcrt.dll", "psapi.dll", "user32.dll", "advapi32.dll", "shell32.dll"}
-SKIPPED = 77
 UNREADABLE_INPUT, UNWRITABLE_OUTPUT = 2, 4
 
 
@@ -61,17 +58,20 @@ class Folder(unittest.TestCase):
         return written
 
 
-class Programs(unittest.TestCase):
-    def test_they_need_no_dll_but_those_of_windows(self):
-        for file in (BUILD / (BVHBUILD + ".exe"), BUILD / (BVHINFO + ".exe"), BUILD / "bindings/c/libtandem.dll"):
-            listed = subprocess.run(["x86_64-w64-mingw32-objdump", "-p", file], capture_output=True, text=True, check=True).stdout
-            self.assertLessEqual({name.lower() for name in re.findall(r"DLL Name: (\S+)", listed)}, SYSTEM, file)
+class Programs(LinkedPrograms, unittest.TestCase):
+    programs, library = (BUILD / (BVHBUILD + ".exe"), BUILD / (BVHINFO + ".exe")), BUILD / "bindings/c/libtandem.dll"
+    system = {"kernel32.dll", "msvcrt.dll", "psapi.dll", "user32.dll", "advapi32.dll", "shell32.dll"}
 
-    def test_the_library_exports_its_interface_alone(self):
-        listed = subprocess.run(["x86_64-w64-mingw32-objdump", "-p", BUILD / "bindings/c/libtandem.dll"], capture_output=True, text=True, check=True).stdout
-        exported = set(re.findall(r"^\s*\[\s*\d+\] (?:\+base\[\s*\d+\]\s+\S+ )?(\S+)$", listed[listed.index("[Ordinal/Name Pointer] Table"):], re.MULTILINE))
-        header = (SOURCE_DIR / "bindings/c/include/tandem/tandem.h").read_text(encoding="utf-8")
-        self.assertEqual(exported, set(re.findall(r"^TANDEM_API [^;]*?\b(tandem_\w+)\(", header, re.MULTILINE)))
+    @staticmethod
+    def headers(file):
+        return subprocess.run(["x86_64-w64-mingw32-objdump", "-p", file], capture_output=True, text=True, check=True).stdout
+
+    def loaded_by(self, file):
+        return {name.lower() for name in re.findall(r"DLL Name: (\S+)", self.headers(file))}
+
+    def exported_by(self, file):
+        listed = self.headers(file)
+        return set(re.findall(r"^\s*\[\s*\d+\] (?:\+base\[\s*\d+\]\s+\S+ )?(\S+)$", listed[listed.index("[Ordinal/Name Pointer] Table"):], re.MULTILINE))
 
 
 class SimdWays(unittest.TestCase):
@@ -180,4 +180,4 @@ if __name__ == "__main__":
     if "SharedMeshes" in sys.argv and not MESHES.is_dir():
         print(f"SKIPPED: {MESHES} is not here (set TANDEM_MESHES)")
         sys.exit(SKIPPED)
-    unittest.main()
+    run_tests()

@@ -30,8 +30,8 @@ const char* skip_payload(const char* first, const char* last) {
   return end != last && *end == ')' ? end + 1 : first;
 }
 
-// Returns the end of "12.5e-3", "inf", "infinity", "nan" or "nan(ind)", as strtod() knows them without a sign;
-// `first` where there is none of these. has_value becomes true where some digit is not 0.
+// Returns the end of "12.5e-3", "inf", "infinity", "nan" or "nan(ind)", as strtod() knows them without a
+// sign; `first` where there is none of these. has_value becomes true where some digit is not 0.
 const char* number_end(const char* first, const char* last, bool& has_value) {
   const char* const whole = skip_digits(first, last);
   const char* end = whole;

@@ -1,10 +1,12 @@
 #!/usr/bin/python3
-"""Tests of the parts of scripts/site that need neither the generator nor a browser. Environment: PYTHONPATH with scripts/."""
+"""Tests of the parts of scripts/site that need neither the generator nor a browser. Environment: PYTHONPATH with scripts/, and TANDEM_BVHBUILD and its like, the programs."""
+import re
 import tempfile
 import unittest
 from pathlib import Path
 
-from pages import check_links, python_names, sources
+from common import tools
+from pages import check_links, commands, python_names, sources
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -90,6 +92,38 @@ class PythonNames(unittest.TestCase):
             (Path(folder) / "__init__.py").write_text('__all__ = ["nobody_knows"]\n')
             with self.assertRaisesRegex(ValueError, "nobody_knows"):
                 python_names.pages(Path(folder))
+
+
+class Commands(unittest.TestCase):
+    HELP = {(): "answers questions\nUsage: tool [OPTIONS] SUBCOMMAND\n\nOptions:\n  -h,--help                   prints this\n\nSubcommands:\n  ask                         asks <one>\n\nExit codes: 0 done",
+            ("ask",): "asks one question\nUsage: tool ask [OPTIONS] FILE\n\nPositionals:\n  FILE                        what to read\n\nOptions:\n  -h,--help                   prints this\n"
+                      "  --number N [1]              how often\n  --a-very-long-name-of-an-option FILE\n                              a meaning\n                              of two lines\n[Option Group: limit]\n   \n  [Exactly 1 of these]\n  Options:\n    --memory BYTES_OF_THE_WHOLE of it all\n\nExit codes: 0 done"}
+
+    def test_a_section_has_usage_arguments_and_options(self):
+        parts = list(commands.sections(lambda *words: self.HELP[words[1:]], "tool"))
+        self.assertEqual(len(parts), 2)
+        self.assertTrue(parts[0].startswith("## tool\n\nAnswers questions.\n"))
+        self.assertIn("- [`ask`](#tool-ask): asks \\<one\\>\n", parts[0])
+        self.assertEqual(parts[1], "### tool ask\n\nAsks one question.\n\n```\ntool ask [OPTIONS] FILE\n```\n\nArguments:\n\n- `FILE`: what to read\n\n"
+                                   "#### `--number N [1]` {#tool-ask-number .option}\n\nhow often\n\n"
+                                   "#### `--a-very-long-name-of-an-option FILE` {#tool-ask-a-very-long-name-of-an-option .option}\n\na meaning of two lines\n\n"
+                                   "Exactly 1 of these.\n\n#### `--memory BYTES_OF_THE_WHOLE` {#tool-ask-memory .option}\n\nof it all\n")
+
+    def test_every_option_of_the_programs_has_a_row(self):
+        asked = {}
+
+        def help_of(*words):
+            asked[words] = tools.run(tools.tool(words[0]), *words[1:], "--help")
+            return asked[words]
+
+        page = commands.page(help_of)
+        self.assertGreater(len(asked), 15)
+        sections = dict(zip(asked, re.split(r"^#{2,3} (?=bvh)", page, flags=re.MULTILINE)[1:], strict=True))
+        for words, text in asked.items():
+            self.assertTrue(sections[words].startswith(" ".join(words) + "\n"), words)
+            for option in re.findall(r"^ +(?:-\w,)?(--[\w-]+)", text, re.MULTILINE):
+                if option != "--help":
+                    self.assertRegex(sections[words], rf"(?m)^#### `(?:-\w,)?{option}\b", words)
 
 
 if __name__ == "__main__":

@@ -1,7 +1,19 @@
-// The search runs in a worker, and a browser starts no worker for a page that lies in a folder (file://). This
-// stands in for Worker there: it runs the script in a hidden frame. It does nothing elsewhere. The generator looks
-// for "iframe-worker" in the names of scripts, and would load that of another host.
-if (location.protocol === "file:") {
+// The worker of the search. The generator looks for "iframe-worker" in the names of scripts, and would load that of
+// another host.
+
+// To the search, a dash before a word means that pages must not have the word. Here it is more likely that of an
+// option, such as --levels, which is found without it. A message that is text is what was typed.
+const without_dashes = (message) =>
+  typeof message.data === "string" ? { ...message, data: message.data.replace(/(^|\s)-+/g, "$1") } : message;
+
+if (location.protocol !== "file:") {
+  window.Worker = class extends Worker {
+    postMessage(message) {
+      super.postMessage(without_dashes(message));
+    }
+  };
+} else {
+  // A browser starts no worker for a page that lies in a folder. This runs the worker's script in a hidden frame.
   window.Worker = class extends EventTarget {
     constructor(url) {
       super();
@@ -30,7 +42,8 @@ if (location.protocol === "file:") {
       });
     }
 
-    postMessage(data) {
+    postMessage(message) {
+      const data = without_dashes(message);
       if (this.waiting) this.waiting.push(data);
       else this.deliver(data);
     }

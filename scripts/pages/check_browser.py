@@ -1,8 +1,12 @@
-"""Opens the built pages in Chromium, from their folder: no request leaves it, the console stays empty, the search finds names, and axe finds no serious defect.
+"""Opens the built pages in Chromium, from their folder: no request leaves it, the console stays empty, the search finds names, also where a server has the pages, and axe finds no serious defect.
 
 Usage: python check_browser.py SITE [--check] [--screenshots FOLDER], with the packages of docs/site/requirements.txt."""
 import argparse
+import contextlib
+import functools
+import http.server
 import sys
+import threading
 from pathlib import Path
 
 from axe_playwright_python.sync_playwright import Axe
@@ -17,7 +21,8 @@ KINDS = {"start": "index.html", "concepts": "concepts.html", "guide": "queries.h
 # {what is typed: the page and place that the list of results must hold}
 SEARCHES = {"ContactQuery": "contact_query.html#ContactQuery", "tandem_scene_find_contacts": "tandem.html#tandem_scene_find_contacts", "bodies_at": "scenes.html#tandem.Scene.bodies_at",
             "set_assets": "scene.html#Scene.set_assets", "leave_out_rings": "contact_query.html#ContactOptions", "CollisionManager": "trimesh.html#tandem.trimesh.CollisionManager",
-            "expansion-limit": "command_line.html#bvhbuild", "imaginary node": "concepts.html#imaginary-node", "kNoTopology": "status.html#Status"}
+            "--levels": "command_line.html#bvhbuild-levels", "--leave-out-rings": "command_line.html#bvhbench-query-leave-out-rings",
+            "--memory": "command_line.html#bvhbench-economy-memory", "expansion-limit": "command_line.html#bvhbuild-expansion-limit", "imaginary node": "concepts.html#imaginary-node", "kNoTopology": "status.html#Status"}
 FIRST = 5  # pages of the list in which it must be
 WIDTHS, SCHEMES = (390, 820, 1440), ("light", "dark")
 # Shows all pictures, and returns those that cannot be shown.
@@ -28,8 +33,22 @@ SHOW_PICTURES = """Promise.all([...document.images].map(image => {
 BAD = ("serious", "critical")
 
 
+class Quiet(http.server.SimpleHTTPRequestHandler):
+    def log_message(self, *_):
+        pass
+
+
+@contextlib.contextmanager
+def serving(site):
+    """A server of the pages; gives its address."""
+    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(Quiet, directory=site)) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        yield f"http://127.0.0.1:{server.server_port}"
+        server.shutdown()
+
+
 class Visits:
-    """Opens pages and collects what goes wrong in them."""
+    """Opens pages and collects what goes wrong in them. site: the address of their folder."""
 
     def __init__(self, browser, site):
         self.browser, self.site, self.defects = browser, site, []
@@ -42,9 +61,9 @@ class Visits:
         where = f"{page}, {width} pixels, {scheme}"
         tab.on("console", lambda message: self.defects.append(f"{where}: console: {message.text}") if message.type in ("error", "warning") else None)
         tab.on("pageerror", lambda error: self.defects.append(f"{where}: {error}"))
-        tab.on("request", lambda request: self.defects.append(f"{where}: asks for {request.url}") if not request.url.startswith(("file:", "data:", "blob:", "about:")) else None)
+        tab.on("request", lambda request: self.defects.append(f"{where}: asks for {request.url}") if not request.url.startswith((self.site, "data:", "blob:", "about:")) else None)
         tab.on("requestfailed", lambda request: self.defects.append(f"{where}: does not get {request.url}"))
-        tab.goto((self.site / page).as_uri())
+        tab.goto(f"{self.site}/{page}")
         return tab
 
     def check_page(self, page, width, scheme):
@@ -64,6 +83,9 @@ class Visits:
         for words, wanted in SEARCHES.items():
             tab.keyboard.press("Escape")
             tab.keyboard.press("/")
+            tab.fill("[data-md-component=search-query]", "")
+            tab.keyboard.press("Backspace")
+            tab.wait_for_selector(".md-search-result__item", state="detached")  # those of the words before
             tab.fill("[data-md-component=search-query]", words[:-1])
             tab.keyboard.type(words[-1])  # the search begins when a key is released
             page, _, anchor = wanted.partition("#")
@@ -97,9 +119,13 @@ def main():
     options = parser.parse_args()
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
-        visits = Visits(browser, options.site.resolve())
+        visits = Visits(browser, options.site.resolve().as_uri())
         if options.check:
             visits.check_search()
+            with serving(options.site) as address:
+                served = Visits(browser, address)
+                served.check_search()
+                visits.defects += served.defects
             visits.check_toggle()
             for page in KINDS.values():
                 for width, scheme in ((390, "light"), (1440, "dark")):

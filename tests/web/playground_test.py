@@ -1,5 +1,5 @@
-"""The playground in a real browser, Debian's Chromium by Playwright: it loads without a word in the console, its answers are those of the native library, it is
-quick enough, it shows what it finds, and it works by mouse, keys and touch.
+"""The playground in a real browser, Debian's Chromium by Playwright: it loads without a word in the console, its answers are those of the native library, a
+question is little work, frames go on while it works, it shows what it finds, and it works by mouse, keys and touch.
 
 Usage: pytest tests/web/playground_test.py, after scripts/build_web. Environment: TANDEM_SCREENSHOTS, a folder for pictures at three widths.
 """
@@ -97,7 +97,7 @@ def share_near(image, colour):
     return near / (image.width * image.height)
 
 
-# Asks the worker itself, without a picture: contacts as bytes, and the time of each of so many poses.
+# Asks the worker itself, without a picture: contacts as bytes, and what is counted, for each of so many poses.
 ASK_WORKER = """async ({mesh, poses}) => {
   const { pose_about, turned } = await import("./pose.mjs");
   const worker = new Worker("worker.mjs", { type: "module" });
@@ -113,9 +113,8 @@ ASK_WORKER = """async ({mesh, poses}) => {
   const answers = [];
   for (const { q, position } of poses) {
     const asked = { a: pose_about(loaded.centre, [0, 0, 0, 1], [0, 0, 0]), b: pose_about(loaded.centre, turned(q, [0, 0, 1], 0), position) };
-    const begin = performance.now();
     const answer = await request("ask", { poses: asked, wants: { manifolds: true, distance: true }, ray: null });
-    answers.push({ asked, seconds: (performance.now() - begin) / 1000, contacts: [...answer.contact_bytes], count: answer.contact_count,
+    answers.push({ asked, contacts: [...answer.contact_bytes], count: answer.contact_count,
       depths: answer.manifolds.map(({ depth }) => depth), distance: [answer.distance.lower, answer.distance.upper], counters: answer.counters });
   }
   worker.terminate();
@@ -146,15 +145,17 @@ def test_answers_are_those_of_the_native_library(open_page):
     assert done.returncode == 0, done.stderr
 
 
-def test_sixty_questions_a_second_about_meshes_of_100_000_triangles(open_page):
+def test_a_question_about_meshes_of_100_000_triangles_is_little_work(open_page):
+    """Work is counted, as times depend on the machine: a question took 3.5 ms on one that was idle, with at most 3,540 block pairs and 8,289 candidates. Twice that leaves room
+    in the sixtieth of a second that a frame has."""
     page = open_page(APART)
     poses = [{"q": [0.1, 0.02 * i, 0.05, 1], "position": [1.9 - 0.002 * i, 0.1, 0.05]} for i in range(60)]
     found = page.evaluate(ASK_WORKER, {"mesh": "sphere 100000", "poses": poses})
     assert found["triangles"] > 99_000
     assert all(answer["count"] for answer in found["answers"])
-    seconds = sorted(answer["seconds"] for answer in found["answers"])
-    print(f"median {1000 * seconds[30]:.2f} ms, slowest {1000 * seconds[-1]:.2f} ms")
-    assert seconds[30] < 1 / 60
+    counters = [answer["counters"] for answer in found["answers"]]
+    assert max(each["block_pairs"] for each in counters) < 7000
+    assert max(each["candidates"] for each in counters) < 16000
 
 
 def test_the_picture_shows_the_meshes_and_their_contacts(open_page):
@@ -268,12 +269,10 @@ def test_a_finger_drags_and_two_zoom(open_page):
     assert position(page)[2] != start[2]
 
 
-def test_it_answers_while_it_is_dragged_and_never_waits(open_page):
+def test_it_answers_while_it_is_dragged(open_page):
     # The picture is small, as this machine's processor draws it.
     page = open_page("#a=sphere 100000&b=sphere 100000&p=1.9,0,0&v=0.6,0.35,5&show=cmd", viewport={"width": 700, "height": 300})
     box = page.locator("#picture").bounding_box()
-    page.evaluate("""() => { window.slowest = 0; let last = performance.now();
-        setInterval(() => { const now = performance.now(); slowest = Math.max(slowest, now - last); last = now; }, 5); }""")
     before = answered(page)
     page.mouse.move(box["x"] + 200, box["y"] + 100)
     page.mouse.down()
@@ -281,8 +280,20 @@ def test_it_answers_while_it_is_dragged_and_never_waits(open_page):
         page.mouse.move(box["x"] + 200 - step, box["y"] + 100)
     page.mouse.up()
     wait_for_answer(page, before + 1)
-    # The questions are not on this thread.
-    assert page.evaluate("slowest") < 2000
+
+
+def test_frames_go_on_while_a_large_mesh_is_made(open_page):
+    """The tree of 300,000 triangles takes a second or more. Were it made on this thread, no frame would come meanwhile."""
+    page = open_page(APART)
+    frames = page.evaluate("""() => new Promise((resolve) => {
+        let frames = 0;
+        const wait = document.getElementById("wait");
+        const count = () => (wait.textContent.includes("300000") ? (++frames, requestAnimationFrame(count)) : resolve(frames));
+        location.hash = "#a=sphere 300000&b=box_12.obj&p=9,0,0&q=0,0,0,1&v=0,0,30&show=c";
+        addEventListener("hashchange", () => requestAnimationFrame(count), { once: true });
+    })""")
+    print(f"{frames} frames")
+    assert frames > 10
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])

@@ -1,17 +1,16 @@
 #include "triangle_oracle.h"
 
-#include <CGAL/Exact_predicates_exact_constructions_kernel.h>
-#include <CGAL/Gmpq.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <variant>
 
+#include "kernels/rational.h"
+
 namespace tandem {
 namespace {
 
-using Kernel = CGAL::Exact_predicates_exact_constructions_kernel;
+using Kernel = ExactKernel;
 using Point = Kernel::Point_3;
 using Shape = std::variant<Point, Kernel::Segment_3, Kernel::Triangle_3>;
 
@@ -39,37 +38,19 @@ bool meet(const A& a, const B& b) {
   return CGAL::do_intersect(a, b);
 }
 
-CGAL::Gmpq rational_volume(const double* p, const double* q, const double* r, const double* s) {
-  CGAL::Gmpq d[3][3];
-  const double* point[] = {q, r, s};
-  for (int i = 0; i < 3; ++i) {
-    for (int k = 0; k < 3; ++k) d[i][k] = CGAL::Gmpq(point[i][k]) - CGAL::Gmpq(p[k]);
-  }
-  return d[0][0] * (d[1][1] * d[2][2] - d[1][2] * d[2][1]) -
-         d[0][1] * (d[1][0] * d[2][2] - d[1][2] * d[2][0]) +
-         d[0][2] * (d[1][0] * d[2][1] - d[1][1] * d[2][0]);
+/// det(q - p, r - p, s - p).
+Rational rational_volume(const double* p, const double* q, const double* r, const double* s) {
+  const RationalPoint from = rational(p);
+  return dot(rational(q) - from, cross(rational(r) - from, rational(s) - from));
 }
 
-using Rational = CGAL::Gmpq;
-using RationalPoint = std::array<Rational, 3>;
-
-RationalPoint rational(const double* p) {
-  return {Rational(p[0]), Rational(p[1]), Rational(p[2])};
-}
-RationalPoint operator-(const RationalPoint& p, const RationalPoint& q) {
-  return {p[0] - q[0], p[1] - q[1], p[2] - q[2]};
-}
-RationalPoint operator+(const RationalPoint& p, const RationalPoint& q) {
-  return {p[0] + q[0], p[1] + q[1], p[2] + q[2]};
-}
-RationalPoint operator*(const Rational& f, const RationalPoint& p) {
-  return {f * p[0], f * p[1], f * p[2]};
-}
-Rational dot(const RationalPoint& p, const RationalPoint& q) {
-  return p[0] * q[0] + p[1] * q[1] + p[2] * q[2];
-}
 Rational clamped(const Rational& x) {
   return x < 0 ? Rational(0) : x > 1 ? Rational(1) : x;
+}
+
+/// |x|, rounded.
+double size_of(const Rational& x) {
+  return CGAL::to_double(x < 0 ? Rational(-x) : x);
 }
 
 /// The square of the distance of a point and a segment that starts at the origin.
@@ -146,6 +127,10 @@ double DistanceOracle::rounded() const {
   return std::sqrt(CGAL::to_double(square_->value));
 }
 
+int oracle_share() {
+  return kOracleShare;
+}
+
 bool oracle_contact(const TrianglePair& pair) {
   return std::visit([](const auto& a, const auto& b) { return meet(a, b); }, shape(pair.a), shape(pair.b));
 }
@@ -156,14 +141,13 @@ int oracle_volume_sign(const double* p, const double* q, const double* r, const 
 
 double oracle_volume_error(const double* p, const double* q, const double* r, const double* s,
                            double computed) {
-  return CGAL::to_double(CGAL::abs(CGAL::Gmpq(computed) - rational_volume(p, q, r, s)));
+  return size_of(Rational(computed) - rational_volume(p, q, r, s));
 }
 
 double oracle_area_error(const double* p, const double* q, const double* r, int k, double computed) {
-  const int i = (k + 1) % 3, j = (k + 2) % 3;
-  const auto minus = [&](const double* x, int axis) { return CGAL::Gmpq(x[axis]) - CGAL::Gmpq(p[axis]); };
-  const CGAL::Gmpq area = minus(q, i) * minus(r, j) - minus(q, j) * minus(r, i);
-  return CGAL::to_double(CGAL::abs(CGAL::Gmpq(computed) - area));
+  const RationalPoint from = rational(p);
+  const Rational area = cross(rational(q) - from, rational(r) - from)[static_cast<std::size_t>(k)];
+  return size_of(Rational(computed) - area);
 }
 
 }  // namespace tandem

@@ -4,22 +4,24 @@
 Environment: TANDEM_BUILD (the preset windows), TANDEM_NATIVE_BUILD (a build of this machine), TANDEM_SOURCE_DIR; TANDEM_MESHES: a folder of meshes, else
 ../shared/meshes beside the sources. What compares meshes of it is skipped (exit code 77) where it is not there.
 """
+import json
 import os
 import pathlib
 import re
 import shutil
-import signal
 import subprocess
 import sys
 import tempfile
-import time
 import unittest
+
+import h5py
 
 from linked_programs import BUILD, SKIPPED, SOURCE_DIR, LinkedPrograms, run_tests
 
 NATIVE = pathlib.Path(os.environ["TANDEM_NATIVE_BUILD"])
 MESHES = pathlib.Path(os.environ.get("TANDEM_MESHES", SOURCE_DIR.parent / "shared" / "meshes"))
-BVHBUILD, BVHINFO, ANSWERS, VARIANTS = "tools/bvhbuild/bvhbuild", "tools/bvhinfo/bvhinfo", "tests/platforms/answers", "tests/kernels/variant_check"
+BVHBUILD, BVHINFO, BVHBENCH = "tools/bvhbuild/bvhbuild", "tools/bvhinfo/bvhinfo", "tools/bvhbench/bvhbench"
+ANSWERS, SCENE_HASHES, VARIANTS = "tests/platforms/answers", "tests/platforms/scene_hashes", "tests/kernels/variant_check"
 UNREADABLE_INPUT, UNWRITABLE_OUTPUT = 2, 4
 
 
@@ -120,6 +122,56 @@ class Answers(Folder):
         return [line.split()[:2] if line.split()[0] in ("impacts", "world") else line.split() for line in lines.splitlines()]
 
 
+class BenchScenes(Folder):
+    """Object pairs, contacts and hashes of contacts of the bench's scenes. The Windows programs have no HDF5: they make the scenes themselves, and take positions of bodies that bend from raw files."""
+
+    def bvh(self, mesh):
+        path = self.root / f"{mesh}.bvh"
+        if not path.exists():
+            self.assertEqual(native(BVHBUILD, SOURCE_DIR / f"assets/{mesh}.obj", "-o", path, "--quiet").returncode, 0)
+        return path
+
+    def asked(self, *words):
+        """What bvhbench finds on this machine."""
+        result = native(BVHBENCH, "query", *words, "--json")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        report = json.loads(result.stdout)
+        return f"{report['object_pairs']} {report['contacts']} {report['hash']}"
+
+    def hashes(self, *words):
+        result = windows(SCENE_HASHES, *words)
+        self.assertEqual((result.returncode, result.stderr), (0, ""))
+        return result.stdout.splitlines()
+
+    def test_scenes_of_every_kind_have_the_same_contacts(self):
+        boxes, cows = ("box_12", "box_48", "box_192"), ("cow_1500", "cow", "cow_24000")
+        scenes = [("stack", 1000, mesh, []) for mesh in boxes] + [("pile", 1000, mesh, []) for mesh in cows] + [("slide", 2500, mesh, ["--ground", self.bvh("ground")]) for mesh in cows]
+        scenes += [("exact-stack", 1000, "box_12", ["--exact"]), ("coincident", 50, "cow_1500", []), ("lattice", 1000, "cow", []), ("field", 1000, "cow_1500", ["--fixed", 10000])]
+        for kind, count, mesh, words in scenes:
+            with self.subTest(kind=kind, mesh=mesh):
+                scene, body = self.root / "scene.h5", self.bvh(mesh)
+                made = native(BVHBENCH, "scene", kind.removeprefix("exact-"), "--mesh", body, "--count", str(count), *map(str, words), "-o", scene)
+                self.assertEqual(made.returncode, 0, made.stderr)
+                self.assertEqual(self.hashes(kind, str(count), body, *[word for word in words if word == self.bvh("ground")]), [self.asked(scene)])
+
+    def test_bodies_that_bend_have_the_same_contacts(self):
+        kinds = re.findall(r'"(\w+)"', re.search(r"^KINDS = .*", (SOURCE_DIR / "scripts/make_deformations").read_text(encoding="utf-8"), re.MULTILINE)[0])
+        self.assertGreater(len(kinds), 11)
+        for kind in kinds:
+            with self.subTest(kind=kind):
+                body, scene = self.bvh("ground" if kind == "cloth" else "cow_1500"), self.root / "bent.h5"
+                subprocess.run([sys.executable, SOURCE_DIR / "scripts/make_deformations", kind, body, "-o", scene, "--frames", "5"], check=True)
+                frames = []
+                with h5py.File(scene) as file:
+                    beside = [repr(float(x)) for x in file["instances/translation"][1]]
+                    for positions in file["deformations/0"]:
+                        frames.append(self.root / f"{len(frames)}.f32")
+                        frames[-1].write_bytes(positions.astype("<f4").tobytes())
+                found = self.hashes("bend", body, body, *beside, *frames)
+                self.assertEqual(found, [self.asked(scene, "--frame", str(frame)) for frame in range(5)])
+                self.assertGreater(len(set(found)), 2)
+
+
 class Paths(Folder):
     def test_names_may_hold_blanks_and_letters_of_any_script(self):
         folder = self.root / "Ein Ordner \u4e2d\u6587 \u0440\u0443\u0441"
@@ -160,20 +212,31 @@ class Outputs(Folder):
         finally:
             subprocess.run(["umount", disk], check=True)
 
-    def test_ctrl_c_while_it_writes_leaves_no_partial_file(self):
-        """Wine makes a Ctrl-C of SIGINT. It comes as soon as the temporary file is seen, until it once came before the end."""
-        for _ in range(20):
-            command = ["wine", BUILD / (BVHBUILD + ".exe"), SOURCE_DIR / "assets/cow_24000.obj", "-o", self.root / "a.bvh", "--quiet"]
-            process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-            while process.poll() is None and not any(".tmp" in name for name in self.files()):
-                time.sleep(0.0002)
-            process.send_signal(signal.SIGINT)
-            process.wait(timeout=60)
-            self.assertEqual([name for name in self.files() if name != "a.bvh"], [])
+
+class CtrlC(Folder):
+    def press(self, when, *words):
+        """Starts bvhbuild.exe and presses Ctrl-C in its console: when a temporary file is in the folder `when`, or after so many milliseconds. Returns what was printed."""
+        result = windows("tests/platforms/ctrl_c", when, BUILD / (BVHBUILD + ".exe"), SOURCE_DIR / "assets/cow_24000.obj", "-o", self.root / "a.bvh", *words, timeout=300)
+        self.assertEqual((result.returncode, result.stderr), (0, ""))
+        self.assertLessEqual(set(self.files()), {"a.bvh"})
+        return result.stdout
+
+    def test_while_it_writes_it_leaves_no_partial_file(self):
+        for _ in range(40):
+            self.press(self.root, "--quiet", "--effort", "fast")
             if not (self.root / "a.bvh").exists():
                 return
             (self.root / "a.bvh").unlink()
         self.fail("Ctrl-C always came too late")
+
+    def test_while_it_optimises_it_keeps_the_best_tree_so_far(self):
+        delay = 250
+        while '"interrupted": true' not in self.press(str(delay), "--effort", "best", "--json"):
+            # It came before the optimisation, and ended the process.
+            self.assertFalse((self.root / "a.bvh").exists(), "Ctrl-C never came")
+            delay *= 2
+        shown = windows(BVHINFO, self.root / "a.bvh", "--verify")
+        self.assertEqual((shown.returncode, shown.stderr), (0, ""))
 
 
 if __name__ == "__main__":

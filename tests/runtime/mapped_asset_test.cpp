@@ -269,6 +269,19 @@ TEST_P(Map, MovesAndReopens) {
   EXPECT_EQ(second.data(), nullptr);
 }
 
+// Where a system refuses to replace a mapped file, this one stays whole.
+TEST_P(Map, KeepsWhatItHoldsWhileTheFileIsReplaced) {
+  const std::string path = write_asset("a.bvh", 10);
+  MappedAsset asset, other;
+  ASSERT_EQ(asset.open(path.c_str(), GetParam()), Status::kOk);
+  std::error_code refused;
+  fs::rename(write_asset("b.bvh", 20), path, refused);
+  EXPECT_EQ(check(asset.data(), asset.view().header->file_bytes).status, Status::kOk);
+  EXPECT_EQ(asset.view().level().triangle_count, 10u);
+  ASSERT_EQ(other.open(path.c_str(), GetParam()), Status::kOk);
+  EXPECT_EQ(other.view().level().triangle_count, refused ? 10u : 20u);
+}
+
 TEST_P(Map, TakesNamesOfAnyLettersAsUtf8) {
   const fs::path path = folder_ / u8"K\u00fche \u725b \U0001F404.bvh";
   fs::rename(write_asset("a.bvh", 10), path);

@@ -62,18 +62,9 @@ const std::map<std::string, std::string> kGpuEngines = {
     {"tandem", "tandem-cuda"}, {"paper", "paper"}, {"paper-bits", "paper-bits"}};
 
 // Takes the contacts.
-ContactTable table_of(const LoadedScene& scene, TimedAnswer& timed) {
-  const std::vector<AssetView> views = scene.views();
-  const auto face = [&](std::uint32_t instance, std::uint32_t triangle) {
-    const std::uint32_t shape = scene.description.instances[instance].asset;
-    return views[shape].level().triangles[triangle].source_face();
-  };
-  std::vector<FaceContact> faces;
-  faces.reserve(timed.contacts.size());
-  for (const auto& [pair, a, b] : timed.contacts)
-    faces.push_back({pair, face(timed.pairs[pair].a, a), face(timed.pairs[pair].b, b)});
-  std::vector<TriangleContact>().swap(timed.contacts);
-  return make_table(timed.pairs, std::move(faces));
+ContactTable take_table(const LoadedScene& scene, TimedAnswer& timed) {
+  const std::vector<TriangleContact> contacts = std::move(timed.contacts);
+  return table_of(scene.views(), scene.description.instances, timed.pairs, contacts);
 }
 
 // Deforms the shapes as the frame says.
@@ -113,7 +104,7 @@ Answer find(const QueryArguments& arguments, const LoadedScene& scene) {
     answer.contained = find_contained(scene, answer.timed.pairs, answer.timed.contacts, arguments.threads(),
                                       arguments.repeats);
   }
-  answer.table = table_of(scene, answer.timed);
+  answer.table = take_table(scene, answer.timed);
   return answer;
 }
 

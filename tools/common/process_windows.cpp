@@ -7,6 +7,7 @@
 #include <psapi.h>
 
 #include <cstdio>
+#include <cstring>
 
 #include "exit_code.h"
 
@@ -15,10 +16,13 @@ namespace {
 
 char g_file_is_gone[128] = "";
 
-// A page of a mapped file cannot be read, as when its disk or its network fails.
+// A page of a mapped file cannot be read, as when its disk or its network fails. The message does not go by
+// stderr, which may keep it in a buffer.
 LONG WINAPI tell_that_a_file_is_gone(EXCEPTION_POINTERS* exception) {
   if (exception->ExceptionRecord->ExceptionCode != EXCEPTION_IN_PAGE_ERROR) return EXCEPTION_CONTINUE_SEARCH;
-  std::fputs(g_file_is_gone, stderr);
+  DWORD written = 0;
+  WriteFile(GetStdHandle(STD_ERROR_HANDLE), g_file_is_gone, static_cast<DWORD>(std::strlen(g_file_is_gone)),
+            &written, nullptr);
   TerminateProcess(GetCurrentProcess(), kUnreadableInput);
   return EXCEPTION_CONTINUE_SEARCH;
 }

@@ -127,7 +127,7 @@ TEST_P(Scenes, HaveTheContactsOfExactArithmeticOnAllPairsOfTriangles) {
 /// decide_exact(), by which the test above judges, against CGAL.
 TEST_P(Scenes, HaveTheContactsThatCgalFinds) {
   test::Asked<ContactQuery> query;
-  for_scenes(test::trials(40, 50), [&](const BodyScene& scene, int) {
+  for_scenes(test::trials(40, 50) / oracle_share(), [&](const BodyScene& scene, int) {
     ASSERT_EQ(query.set_assets(scene.assets.views()), Status::kOk);
     ASSERT_EQ(query.find(scene.instances), Status::kOk);
     FaceContacts expected;

@@ -115,7 +115,7 @@ class TriangleDistances : public testing::TestWithParam<TriangleFamily> {};
 
 TEST_P(TriangleDistances, EveryIntervalHoldsTheExactDistance) {
   Random random(815);
-  const int count = pairs_per_family();
+  const int count = pairs_per_family() / oracle_share();
   int apart = 0;
   for (int i = 0; i < count && !HasFailure(); ++i) {
     const TrianglePair pair = GetParam().make(random);
@@ -128,7 +128,7 @@ TEST_P(TriangleDistances, EveryIntervalHoldsTheExactDistance) {
 
 TEST_P(TriangleDistances, ClearanceIsDecidedExactly) {
   Random random(1111);
-  const int count = pairs_per_family() / 25;
+  const int count = pairs_per_family() / 25 / oracle_share();
   for (int i = 0; i < count && !HasFailure(); ++i) {
     const TrianglePair pair = GetParam().make(random);
     if (in_range(pair)) expect_decisions_right(pair);

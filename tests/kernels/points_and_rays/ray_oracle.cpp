@@ -1,35 +1,21 @@
 #include "kernels/points_and_rays/ray_oracle.h"
 
-#include <CGAL/Gmpq.h>
 #include <CGAL/Interval_nt.h>
 
 #include <array>
 #include <utility>
 
+#include "kernels/rational.h"
+
 namespace tandem {
 namespace {
 
-using Rational = CGAL::Gmpq;
-using RationalVector = std::array<Rational, 3>;
-
-RationalVector rational(const double* p) {
-  return {Rational(p[0]), Rational(p[1]), Rational(p[2])};
-}
-RationalVector minus(const RationalVector& p, const RationalVector& q) {
-  return {p[0] - q[0], p[1] - q[1], p[2] - q[2]};
-}
-Rational dot(const RationalVector& p, const RationalVector& q) {
-  return p[0] * q[0] + p[1] * q[1] + p[2] * q[2];
-}
-RationalVector cross(const RationalVector& p, const RationalVector& q) {
-  return {p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0]};
-}
-bool is_zero(const RationalVector& p) {
+bool is_zero(const RationalPoint& p) {
   return p[0] == 0 && p[1] == 0 && p[2] == 0;
 }
 
-bool is_on_segment(const RationalVector& x, const RationalVector& p, const RationalVector& q) {
-  const RationalVector along = minus(q, p), from = minus(x, p);
+bool is_on_segment(const RationalPoint& x, const RationalPoint& p, const RationalPoint& q) {
+  const RationalPoint along = q - p, from = x - p;
   const Rational share = dot(from, along);
   return is_zero(cross(along, from)) && share >= 0 && share <= dot(along, along) &&
          (!is_zero(along) || is_zero(from));
@@ -61,26 +47,26 @@ bool surely_passes_by(const double* origin, const double* direction, const doubl
 }
 
 struct RayOracle::Found {
-  RationalVector corner[3];
+  RationalPoint corner[3];
   bool meets = false, plain = true;
   Rational t;
-  RationalVector at;
+  RationalPoint at;
 
-  bool is_in_hull(const RationalVector& x) const {
-    const RationalVector normal = cross(minus(corner[1], corner[0]), minus(corner[2], corner[0]));
+  bool is_in_hull(const RationalPoint& x) const {
+    const RationalPoint normal = cross(corner[1] - corner[0], corner[2] - corner[0]);
     if (is_zero(normal)) {
       return is_on_segment(x, corner[0], corner[1]) || is_on_segment(x, corner[1], corner[2]) ||
              is_on_segment(x, corner[2], corner[0]);
     }
-    bool within = dot(normal, minus(x, corner[0])) == 0;
+    bool within = dot(normal, x - corner[0]) == 0;
     for (int i = 0; i < 3 && within; ++i)
-      within = dot(cross(minus(corner[(i + 1) % 3], corner[i]), minus(x, corner[i])), normal) >= 0;
+      within = dot(cross(corner[(i + 1) % 3] - corner[i], x - corner[i]), normal) >= 0;
     return within;
   }
 
-  void offer(const RationalVector& o, const RationalVector& d, const Rational& t_there) {
+  void offer(const RationalPoint& o, const RationalPoint& d, const Rational& t_there) {
     if (t_there < 0 || (meets && t <= t_there)) return;
-    const RationalVector x = {o[0] + t_there * d[0], o[1] + t_there * d[1], o[2] + t_there * d[2]};
+    const RationalPoint x = o + t_there * d;
     if (!is_in_hull(x)) return;
     meets = true;
     t = t_there;
@@ -90,16 +76,16 @@ struct RayOracle::Found {
 
 RayOracle::RayOracle(const double* origin, const double* direction, const double (*corner)[3])
     : found_(std::make_unique<Found>()) {
-  const RationalVector o = rational(origin), d = rational(direction);
+  const RationalPoint o = rational(origin), d = rational(direction);
   for (int i = 0; i < 3; ++i) found_->corner[i] = rational(corner[i]);
   const auto& c = found_->corner;
   found_->offer(o, d, 0);
-  const RationalVector normal = cross(minus(c[1], c[0]), minus(c[2], c[0]));
+  const RationalPoint normal = cross(c[1] - c[0], c[2] - c[0]);
   const Rational slope = dot(d, normal);
-  if (slope != 0) found_->offer(o, d, dot(minus(c[0], o), normal) / slope);
+  if (slope != 0) found_->offer(o, d, dot(c[0] - o, normal) / slope);
   found_->plain = slope != 0;
   for (int i = 0; i < 3; ++i) {
-    const RationalVector p = minus(c[i], o), e = minus(c[(i + 1) % 3], c[i]), across = cross(d, e);
+    const RationalPoint p = c[i] - o, e = c[(i + 1) % 3] - c[i], across = cross(d, e);
     found_->offer(o, d, dot(p, d) / dot(d, d));
     if (!is_zero(across)) found_->offer(o, d, dot(cross(p, e), across) / dot(across, across));
     if (dot(p, across) == 0) found_->plain = false;
@@ -124,10 +110,10 @@ bool RayOracle::is_at_most(double t) const {
 }
 bool RayOracle::has_weights(const double* weight, double off) const {
   const auto& c = found_->corner;
-  const RationalVector normal = cross(minus(c[1], c[0]), minus(c[2], c[0]));
+  const RationalPoint normal = cross(c[1] - c[0], c[2] - c[0]);
   const Rational square = dot(normal, normal);
-  const Rational b = dot(cross(minus(found_->at, c[0]), minus(c[2], c[0])), normal) / square;
-  const Rational a = dot(cross(minus(c[1], c[0]), minus(found_->at, c[0])), normal) / square;
+  const Rational b = dot(cross(found_->at - c[0], c[2] - c[0]), normal) / square;
+  const Rational a = dot(cross(c[1] - c[0], found_->at - c[0]), normal) / square;
   const auto near = [&](const Rational& x, double y) {
     const Rational apart = x - Rational(y);
     return apart <= Rational(off) && -apart <= Rational(off);

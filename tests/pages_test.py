@@ -44,7 +44,7 @@ class Links(unittest.TestCase):
         return self.site.with_links("docs/decisions/trees.md", "decisions/trees.md", text)
 
     def test_links_lead_to_places_of_the_site(self):
-        for before, after in (("[w](../concepts.md#first)", "[w](../concepts.md#first)"), ("[concepts.md](../concepts.md)", "[First](../concepts.md)"), ("[w](../../README.md)", "[w](../index.md)"),
+        for before, after in (("[w](../concepts.md#first)", "[w](../concepts.md#first)"), ("[concepts.md](../concepts.md)", "[First](../concepts.md)"), ("[concepts.md](../concepts.md#first)", "[First](../concepts.md#first)"), ("[w](../../README.md)", "[w](../index.md)"),
                               ("[w](../../kernels/x.h)", "[w](../source/kernels/x.h.md)"), ("[w](../../kernels)", "w"), ("`[w](../../kernels)`", "`[w](../../kernels)`"),
                               ('<img src="../images/p.png">', '<img src="../images/p.svg">'), ("[w](https://example.org)", "[w](https://example.org)")):
             with self.subTest(link=before):
@@ -97,7 +97,7 @@ class PythonNames(unittest.TestCase):
 class Commands(unittest.TestCase):
     HELP = {(): "answers questions\nUsage: tool [OPTIONS] SUBCOMMAND\n\nOptions:\n  -h,--help                   prints this\n\nSubcommands:\n  ask                         asks <one>\n\nExit codes: 0 done",
             ("ask",): "asks one question\nUsage: tool ask [OPTIONS] FILE\n\nPositionals:\n  FILE                        what to read\n\nOptions:\n  -h,--help                   prints this\n"
-                      "  --number N [1]              how often\n  --a-very-long-name-of-an-option FILE\n                              a meaning\n                              of two lines\n[Option Group: limit]\n   \n  [Exactly 1 of these]\n  Options:\n    --memory BYTES_OF_THE_WHOLE of it all\n\nExit codes: 0 done"}
+                      "  --number N [1]              how often\n  --lone Excludes: --number --memory\n                              alone\n  --a-very-long-name-of-an-option FILE\n                              a meaning\n                              of two lines\n[Option Group: limit]\n   \n  [Exactly 1 of these]\n  Options:\n    --memory BYTES_OF_THE_WHOLE of it all\n\nExit codes: 0 done"}
 
     def test_a_section_has_usage_arguments_and_options(self):
         parts = list(commands.sections(lambda *words: self.HELP[words[1:]], "tool"))
@@ -105,7 +105,7 @@ class Commands(unittest.TestCase):
         self.assertTrue(parts[0].startswith("## tool\n\nAnswers questions.\n"))
         self.assertIn("- [`ask`](#tool-ask): asks \\<one\\>\n", parts[0])
         self.assertEqual(parts[1], "### tool ask\n\nAsks one question.\n\n```\ntool ask [OPTIONS] FILE\n```\n\nArguments:\n\n- `FILE`: what to read\n\n"
-                                   "#### `--number N [1]` {#tool-ask-number .option}\n\nhow often\n\n"
+                                   "#### `--number N [1]` {#tool-ask-number .option}\n\nhow often\n\n#### `--lone` {#tool-ask-lone .option}\n\nalone (not with --number, --memory)\n\n"
                                    "#### `--a-very-long-name-of-an-option FILE` {#tool-ask-a-very-long-name-of-an-option .option}\n\na meaning of two lines\n\n"
                                    "Exactly 1 of these.\n\n#### `--memory BYTES_OF_THE_WHOLE` {#tool-ask-memory .option}\n\nof it all\n")
 

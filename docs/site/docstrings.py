@@ -3,12 +3,13 @@ import re
 
 import griffe
 
+from pages import titles
+
 _EXAMPLE = re.compile(r"^>>> .*(?:\n.+)*", re.MULTILINE)
-_PAGE = re.compile(r"\bdocs/([\w/-]+)\.md\b")
 
 
 class Readable(griffe.Extension):
     def on_object(self, *, obj, loader, **arguments):
         if obj.docstring:
             text = _EXAMPLE.sub(r"```pycon\n\g<0>\n```", obj.docstring.value)
-            obj.docstring.value = _PAGE.sub(r"[\1.md](../../\1.html)", text)
+            obj.docstring.value = titles.linked(text, lambda name: f"../../{name}.html")

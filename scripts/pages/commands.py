@@ -22,7 +22,7 @@ def rows(lines):
             found[-1][1] = f"{found[-1][1]} {line.strip()}".strip()
         elif re.match(r"^ {2,4}\S", line) and line.strip() not in TITLES:
             column = len(line) - len(line.lstrip()) + NAME_WIDTH
-            split = column if line[column - 1:column] == " " else len(line)
+            split = column if line[column - 1:column] == " " and not re.match(r"\[.*\]$", line[column:]) else len(line)
             found.append([line[:split].strip(), line[split:].strip()])
     return found
 
@@ -32,6 +32,9 @@ def option(words, name, meaning):
     if name.startswith("["):
         return f"{sentence(name.strip('[]'))}\n"
     anchor = "-".join([*words, re.search(r"--([\w-]+)|-(\w)", name)[0].lstrip("-")])
+    name, _, excluded = name.partition(" Excludes: ")
+    if excluded:
+        meaning += f" (not with {excluded.replace(' ', ', ')})"
     return f"#### `{name}` {{#{anchor} .option}}\n\n{escaped(meaning)}\n"
 
 

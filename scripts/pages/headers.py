@@ -7,6 +7,8 @@ from html import escape
 from pathlib import Path
 from posixpath import relpath
 
+from . import titles
+
 C_HEADERS = ("tandem.h", "tandem_cuda.h")
 # {folder of the site: (title, which headers)}; the first that fits has a header.
 GROUPS = {
@@ -157,11 +159,11 @@ class Reference:
                 parts.append(self.inline(child, place))
             parts.append(marked(child.tail or ""))
         text = "".join(parts)
-        return re.sub(r"docs/([\w/-]+(?:\\_[\w/-]+)*)\.md", lambda match: self.to_page(match[1].replace("\\", ""), place), text)
+        return self.with_pages(text, place)
 
     @staticmethod
-    def to_page(name, place):
-        return f"[{name}.md]({relpath(name + '.md', str(Path(place).parent))})"
+    def with_pages(text, place):
+        return titles.linked(text, lambda name: relpath(f"{name}.md", str(Path(place).parent)))
 
     def block(self, element, place):
         return "\n\n".join(filter(None, (self.inline(para, place).strip() for para in element.findall("para"))))
@@ -287,7 +289,7 @@ class Reference:
         """(line, title) of the headings "/// ---- Title" of a C header, and what its first lines say."""
         lines = (self.root / header).read_text(encoding="utf-8").split("\n")
         first = next(k for k, line in enumerate(lines) if not line.startswith("///"))
-        about = re.sub(r"docs/([\w/]+)\.md", lambda match: self.to_page(match[1], self.places[header]), "\n".join(line[4:] for line in lines[:first]))
+        about = self.with_pages("\n".join(line[4:] for line in lines[:first]), self.places[header])
         parts = [(k + 1, line.removeprefix("/// ---- ").rstrip(".")) for k, line in enumerate(lines) if line.startswith("/// ---- ")]
         return about.replace("\n- ", "\n\n- ", 1), parts
 

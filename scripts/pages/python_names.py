@@ -1,6 +1,8 @@
 """The reference of the Python package: which names stand on which page. Signatures and docstrings come from the sources, by mkdocstrings."""
 import re
 
+from . import titles
+
 # {page: (title, what it is about, names of the package)}
 PAGES = {
     "scenes": ("Scenes and questions", "A scene holds bodies and answers questions about them.",
@@ -17,7 +19,6 @@ MODULES = {
     "scene_files": "scene files in HDF5", "tree": "blocks and nodes of an asset",
 }
 _ROW = re.compile(r"((?:^#: .*\n)+)^([A-Z_, ]+) = (.*(?:\n {8}.*)*)", re.MULTILINE)
-_PAGE = re.compile(r"\bdocs/([\w/-]+)\.md\b")
 _FIELD = re.compile(r'\("(\w+)", "([^"]+)"(?:, \(([\d, ]+)\))?\)')
 NUMBERS = {"u1": "uint8", "<u4": "uint32", "<i4": "int32", "<f4": "float32", "<u8": "uint64", "<f8": "float64"}
 
@@ -30,7 +31,7 @@ def rows_page(package):
             text = " ".join(part.removeprefix("#: ") for part in comment.strip().split("\n"))
             first, *others = names.split(", ")
             lines += [f"## {', '.join(f'`{name}`' for name in (first, *others))} {{ #tandem.{first} }}", ""]
-            lines += ["".join(f'<a id="tandem.{name}"></a>' for name in others) + _PAGE.sub(r"[\1.md](../../\1.md)", text.replace("*", r"\*")), ""]
+            lines += ["".join(f'<a id="tandem.{name}"></a>' for name in others) + titles.linked(text.replace("*", r"\*"), lambda name: f"../../{name}.md"), ""]
             lines += [f"- `{field}`: {NUMBERS[number]}{' × ' + shape.rstrip(',').replace(', ', ' × ') if shape else ''}" for field, number, shape in _FIELD.findall(value)]
             lines.append("")
     return "\n".join(lines)

@@ -7,6 +7,8 @@ import re
 from pathlib import Path, PurePosixPath
 from posixpath import normpath, relpath
 
+from . import titles
+
 # {page of the repository: its place in the site}, for those outside docs/ and those that the site alone has.
 PLACES = {"docs/site/start.md": "index.md", "docs/site/reference.md": "reference/index.md", "CONTRIBUTING.md": "CONTRIBUTING.md", "CHANGELOG.md": "CHANGELOG.md",
           "formats/FORMAT.md": "formats/FORMAT.md", "assets/README.md": "assets/README.md"}
@@ -19,7 +21,6 @@ _ITEM = re.compile(r"(?:[-*]|\d+\.) +(?=\S)")
 _CODE = re.compile(r"(`+[^`]+`+)")
 _LINK = re.compile(r"(?P<before>\]\()(?P<target>[^)\s]+)(?P<after>\))|(?P<name>\b(?:src|href|srcset)=\")(?P<value>[^\"]+)(?P<end>\")")
 _WHOLE_LINK = re.compile(r"\[([^\]]+)\]\(([^)\s]+)\)")
-_HEADING = re.compile(r"^# (.+)$", re.MULTILINE)
 
 
 def is_elsewhere(target):
@@ -68,12 +69,6 @@ class Site:
             self.files[there] = self.root / file
         return relpath(there, PurePosixPath(place).parent.as_posix()) + hash_sign + anchor
 
-    def title(self, page, target):
-        """The first heading of a page that a link leads to; the name of any other file."""
-        path = self.root / normpath((PurePosixPath(page).parent / target).as_posix())
-        heading = _HEADING.search(path.read_text(encoding="utf-8")) if path.suffix == ".md" else None
-        return heading[1] if heading else path.name
-
     def with_links(self, page, place, text):
         def replaced(match):
             target = match["target"] or match["value"]
@@ -89,7 +84,8 @@ class Site:
                 return match[0]
             if self.link(page, place, target) is None:
                 return words
-            return f"[{self.title(page, target)}]({target})" if words == PurePosixPath(target).name else match[0]
+            file = (PurePosixPath(page).parent / target.partition("#")[0]).as_posix()
+            return f"[{titles.title_of(self.root / normpath(file))}]({target})" if words == PurePosixPath(file).name else match[0]
 
         parts = _CODE.split(text)
         # Code may stand in the words of a link, so links are looked for in the whole text; code holds no links itself.

@@ -217,7 +217,7 @@ class CtrlC(Folder):
     def press(self, when, *words):
         """Starts bvhbuild.exe and presses Ctrl-C in its console: when a temporary file is in the folder `when`, or after so many milliseconds. Returns what was printed."""
         result = windows("tests/platforms/ctrl_c", when, BUILD / (BVHBUILD + ".exe"), SOURCE_DIR / "assets/cow_24000.obj", "-o", self.root / "a.bvh", *words, timeout=300)
-        self.assertEqual((result.returncode, result.stderr), (0, ""))
+        self.assertEqual(result.returncode, 0, result.stderr)  # Wine may say there that a process is gone
         self.assertLessEqual(set(self.files()), {"a.bvh"})
         return result.stdout
 

@@ -36,8 +36,10 @@ function(tandem_package component)
     string(REGEX MATCH "^([^|]*)\\|(.*)$" matched "${pair}")
     set(CPACK_DEBIAN_${COMPONENT}_${CMAKE_MATCH_1} "${CMAKE_MATCH_2}" PARENT_SCOPE)
   endforeach()
-  set(folder ${CMAKE_INSTALL_DATADIR}/doc/${ARG_NAME})
-  install(FILES ${PROJECT_BINARY_DIR}/packages/copyright ${PROJECT_BINARY_DIR}/packages/changelog.gz DESTINATION ${folder} COMPONENT ${component})
+  if(NOT WIN32)
+    set(folder ${CMAKE_INSTALL_DATADIR}/doc/${ARG_NAME})
+    install(FILES ${PROJECT_BINARY_DIR}/packages/copyright ${PROJECT_BINARY_DIR}/packages/changelog.gz DESTINATION ${folder} COMPONENT ${component})
+  endif()
   set(CPACK_COMPONENTS_ALL ${CPACK_COMPONENTS_ALL} ${component} PARENT_SCOPE)
 endfunction()
 
@@ -57,6 +59,13 @@ file(CONFIGURE OUTPUT packages/copyright @ONLY CONTENT "@licence@
 The program bvhbuild contains code of CGAL's packages that are under the GNU General Public License, version 3 or later
 (/usr/share/common-licenses/GPL-3): as a whole it is under that licence. Libraries and headers contain none of it.
 ")
+
+# Debian has these texts; a zip brings them along. What MinGW-w64 links statically is under the licences of its file.
+if(WIN32)
+  install(FILES ${PROJECT_BINARY_DIR}/packages/copyright DESTINATION licences RENAME tandem.txt)
+  install(FILES /usr/share/common-licenses/GPL-3 DESTINATION licences RENAME GPL-3.txt OPTIONAL)
+  install(FILES /usr/share/doc/mingw-w64-common/copyright DESTINATION licences RENAME mingw-w64.txt OPTIONAL)
+endif()
 
 set(triggers ${PROJECT_BINARY_DIR}/packages/triggers)
 file(WRITE ${triggers} "activate-noawait ldconfig\n")

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import tandem
-from meshes import BOX_FACES, BOX_VERTICES
+from meshes import BOX_FACES, BOX_VERTICES, needs_alarm
 
 BODIES = tandem.instances(translation=np.random.default_rng(1).uniform(0, 6, (400, 3)))
 
@@ -147,6 +147,7 @@ def test_what_progress_raises_ends_the_build(effort):
     assert 0 < caught.value.args[0] <= 1
 
 
+@needs_alarm
 @pytest.mark.parametrize("levels", [None, "auto"])
 def test_ctrl_c_ends_a_long_build(levels):
     if levels:
@@ -162,6 +163,7 @@ def test_ctrl_c_ends_a_long_build(levels):
         signal.signal(signal.SIGALRM, signal.SIG_DFL)
 
 
+@needs_alarm
 @pytest.mark.parametrize("effort, levels", [("fast", None), ("default", None), ("default", ["4%"])])
 def test_ctrl_c_ends_a_build_before_its_next_step(effort, levels):
     if levels:
@@ -206,6 +208,7 @@ def test_daemon_threads_in_a_call_let_the_process_end(setup, work):
     assert (done.returncode, done.stderr) == (0, b"")
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows keeps a file that is mapped")
 def test_files_may_be_replaced_while_they_are_mapped(tmp_path):
     path = tmp_path / "box.bvh"
     tandem.build(BOX_VERTICES, BOX_FACES).save(path)

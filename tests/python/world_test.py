@@ -11,6 +11,7 @@ import pytest
 
 import solids
 import tandem
+from meshes import needs_alarm
 
 ASSETS = Path(os.environ["TANDEM_SOURCE_DIR"]) / "assets"
 HALF = 0.5
@@ -414,6 +415,7 @@ def test_a_second_thread_is_refused_and_others_run():
     assert set(refused) == {"another thread is in a call of this world"}
 
 
+@needs_alarm
 def test_ctrl_c_ends_many_steps():
     world = pair(sleeping=False)
     signal.signal(signal.SIGALRM, signal.default_int_handler)

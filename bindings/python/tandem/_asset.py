@@ -5,6 +5,7 @@ import contextlib
 import json
 import math
 import os
+import sys
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
@@ -129,7 +130,11 @@ class Asset(NotNumbers):
         return Asset._of(_tandem.from_bytes(data, bool(_choice("check", check, ("full", "quick")))))
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Writes the file: whole, or not at all (into a temporary file beside it, which then gets its name)."""
+        """Writes the file: whole, or not at all (into a temporary file beside it, which then gets its name).
+
+        Raises:
+            PermissionError: on Windows, too, where an asset maps the file that is to be replaced.
+        """
         import tempfile  # here, and not for every import of the package
         path = os.path.realpath(path)  # a link stays one
         try:
@@ -139,9 +144,10 @@ class Asset(NotNumbers):
         try:
             with open(descriptor, "wb") as file:
                 file.write(self.data)
-                mask = os.umask(0)
-                os.umask(mask)
-                os.fchmod(file.fileno(), 0o666 & ~mask)
+                if sys.platform != "win32":  # There, the folder decides who may read the file.
+                    mask = os.umask(0)
+                    os.umask(mask)
+                    os.fchmod(file.fileno(), 0o666 & ~mask)
             os.replace(aside, path)
         except BaseException:
             with contextlib.suppress(OSError):

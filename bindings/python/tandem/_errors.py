@@ -63,7 +63,7 @@ def _kind_of(path: str) -> tuple[type[FileError], int | None]:
     try:
         if os.path.isdir(path):
             return _IsADirectory, errno.EISDIR
-        os.close(os.open(path, os.O_RDONLY | os.O_NONBLOCK))  # which does not wait for the other end of a pipe
+        os.close(os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0)))  # which does not wait for the other end of a pipe
     except FileNotFoundError as error:
         return _FileNotFound, error.errno
     except PermissionError as error:

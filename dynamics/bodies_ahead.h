@@ -39,11 +39,15 @@ struct BodiesAhead {
   /// A length in which contacts are told well.
   double overlap() const { return 0.5 * slop; }
 
+  /// Returns how fast the bodies approach each other at a contact, along its normal.
+  double approach_at(const ContactPoint& contact) const {
+    return dot(contact.normal, velocity_at(contact.body_a, contact) - velocity_at(contact.body_b, contact));
+  }
+
   /// Returns whether a contact is a gap that the step will not close.
   bool is_far(const ContactPoint& contact) const {
     if (contact.depth >= -overlap()) return false;
-    const double approach = -dot(contact.normal, velocity_at(contact.body_b, contact.position) -
-                                                     velocity_at(contact.body_a, contact.position));
+    const double approach = approach_at(contact);
     return -contact.depth > dt * (approach > 0 ? approach : 0) +
                                 fall_along({contact.body_a, contact.body_b}, contact.normal) + overlap();
   }
@@ -51,10 +55,10 @@ struct BodiesAhead {
  private:
   static constexpr double kFall = 2;
 
-  Vector3 velocity_at(std::uint32_t body, const Vector3& point) const {
+  Vector3 velocity_at(std::uint32_t body, const ContactPoint& contact) const {
     if (is_idle(body)) return {};
     const BodyState& state = states[body];
-    return state.velocity + cross(state.angular_velocity, point - state.position);
+    return state.velocity + cross(state.angular_velocity, arm_of(contact, state));
   }
 };
 

@@ -22,12 +22,7 @@ double smaller_radius(const ObjectPair& pair, std::span<const BodyProperties> bo
 }
 
 CachedContact cached(const ContactPoint& contact, std::span<const BodyState> states) {
-  return {pair_of(contact),
-          contact.feature,
-          anchor_of(contact, states),
-          rotated(conjugated(states[contact.body_a].orientation), contact.normal),
-          0,
-          {}};
+  return {pair_of(contact), contact.feature, anchor_of(contact, states), normal_in_a(contact, states), 0, {}};
 }
 
 // Returns the contact where the bodies have carried it since it was found.

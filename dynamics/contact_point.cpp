@@ -2,9 +2,21 @@
 
 namespace tandem::dynamics {
 
+BodyState later(const BodyState& state, double seconds) {
+  BodyState out = state;
+  if (seconds == 0) return out;
+  out.position += seconds * state.velocity;
+  out.orientation = normalized(rotation_by(seconds * state.angular_velocity) * state.orientation);
+  return out;
+}
+
 ContactAnchor anchor_of(const ContactPoint& contact, std::span<const BodyState> states) {
-  return {into_body(states[contact.body_a], contact.position),
-          into_body(states[contact.body_b], contact.position), contact.depth};
+  return {into_body(later(states[contact.body_a], contact.time), contact.position),
+          into_body(later(states[contact.body_b], contact.time), contact.position), contact.depth};
+}
+
+Vector3 normal_in_a(const ContactPoint& contact, std::span<const BodyState> states) {
+  return rotated(conjugated(later(states[contact.body_a], contact.time).orientation), contact.normal);
 }
 
 void carry(ContactPoint& contact, const ContactAnchor& anchor, std::span<const BodyState> states) {
@@ -12,12 +24,13 @@ void carry(ContactPoint& contact, const ContactAnchor& anchor, std::span<const B
   const Vector3 on_b = into_world(states[contact.body_b], anchor.in_b);
   contact.position = 0.5 * (on_a + on_b);
   contact.depth = anchor.depth - dot(contact.normal, on_b - on_a);
+  contact.time = 0;
 }
 
 double approach_of(const ContactPoint& contact, std::span<const BodyState> states) {
   const auto velocity = [&](std::uint32_t body) {
     const BodyState& state = states[body];
-    return state.velocity + cross(state.angular_velocity, contact.position - state.position);
+    return state.velocity + cross(state.angular_velocity, arm_of(contact, state));
   };
   return dot(contact.normal, velocity(contact.body_a) - velocity(contact.body_b));
 }

@@ -7,6 +7,10 @@
 
 namespace tandem::dynamics {
 
+/// Bodies whose points move against each other by more slops than this in a step are fast: they are not
+/// about to rest.
+inline constexpr double kFastFrom = 8;
+
 /// A point in which two bodies push against each other: what a solver makes one contact of.
 struct ContactPoint {
   std::uint32_t body_a, body_b;  ///< a < b
@@ -15,6 +19,8 @@ struct ContactPoint {
   double depth;                  ///< lengths along the normal; where bodies are apart, less than 0
   std::uint64_t feature;         ///< equal in successive steps for what is the same contact; 0: none, to be
                                  ///< matched by position
+  double time = 0;  ///< seconds after the step began when position, normal and depth are these, if the bodies
+                    ///< go on as they did
 };
 
 inline ObjectPair pair_of(const ContactPoint& contact) {
@@ -27,10 +33,23 @@ struct ContactAnchor {
   double depth;  ///< when the contact was found
 };
 
+/// Returns where a body is after some seconds if it goes on as it does, with the velocities of now.
+BodyState later(const BodyState& state, double seconds);
+
+/// The contact as a body's own velocities see it: from its centre of mass, at the contact's time.
+inline Vector3 arm_of(const ContactPoint& contact, const BodyState& state) {
+  return contact.position - (state.position + contact.time * state.velocity);
+}
+
+/// Takes the contact's bodies as they stand when the step begins.
 ContactAnchor anchor_of(const ContactPoint& contact, std::span<const BodyState> states);
 
+/// Returns the contact's normal in the frame of a.
+Vector3 normal_in_a(const ContactPoint& contact, std::span<const BodyState> states);
+
 /// Moves a contact to the middle of where its two bodies have carried the point, and corrects its depth by
-/// what these have moved apart along the normal; the depth may become negative. The normal stays.
+/// what these have moved apart along the normal; the depth may become negative. The normal stays. The
+/// contact's time becomes 0.
 void carry(ContactPoint& contact, const ContactAnchor& anchor, std::span<const BodyState> states);
 
 /// Returns how fast the bodies approach each other at the contact, along its normal.

@@ -34,17 +34,46 @@ bool RowMaker::is_of_patch(std::uint32_t first, std::uint32_t contact) const {
   return square(input_.contacts[contact].normal - input_.contacts[first].normal) < 1e-12;
 }
 
-// A gap may close; what is in contact comes no deeper, or bodies would rock within the slop. But where a
-// patch is round, a body that rolls brings the points before it down: they may go on as they turn, and
-// faster. What turns too slowly for that rests.
-double RowMaker::separation_of(const ContactPoint& contact, const ContactPoint& deepest) const {
-  constexpr double kRound = 0.7, kOfSlop = 0.25, kFaster = 4, kLeast = 0.3;
-  const double separation = contact.depth < 0 ? -contact.depth : std::min(0.0, options_.slop - contact.depth);
-  const double lower = deepest.depth - contact.depth;
-  if (lower < kRound * std::max(deepest.depth, kOfSlop * options_.slop)) return separation;
-  const Vector3 spin = states_[contact.body_b].angular_velocity - states_[contact.body_a].angular_velocity;
-  const double rises = dot(contact.normal, cross(spin, contact.position - deepest.position));
-  const double allowed = -kFaster * input_.dt * rises;
+ContactPatch RowMaker::patch_of(std::span<const std::uint32_t> contacts) const {
+  ContactPatch out = {&input_.contacts[contacts[0]], {}};
+  for (const std::uint32_t i : contacts) {
+    const ContactPoint& contact = input_.contacts[i];
+    if (contact.depth > out.deepest->depth) out.deepest = &contact;
+  }
+  const double least = std::min(0.0, out.deepest->depth);
+  double shares = 0;
+  for (const std::uint32_t i : contacts) {
+    const ContactPoint& contact = input_.contacts[i];
+    if (contact.depth < least) continue;
+    const double share = options_.slop + std::max(0.0, contact.depth);
+    out.centre += share * contact.position, shares += share;
+  }
+  out.centre = out.centre / shares;
+  return out;
+}
+
+// A gap may close; what is in contact comes no deeper, or bodies would rock within the slop. But a body that
+// rolls brings the points before it down: they may go on as they turn, and faster. Bodies that turn by no
+// more than the slop rest: there only points of a patch that is clearly round may, if that is much.
+double RowMaker::separation_of(const ContactPoint& contact, const ContactPatch& patch,
+                               const ContactMeeting& meeting) const {
+  constexpr double kFasterWhereFast = 2, kRound = 0.7, kOfSlop = 0.25, kFaster = 4, kLeast = 0.3;
+  // What comes out by itself is not pushed out.
+  const double depth = std::min(contact.depth, depth_at_start(contact, meeting));
+  const double separation = depth < 0 ? -depth : std::min(0.0, options_.slop - depth);
+  const Vector3 spin_a = states_[contact.body_a].angular_velocity,
+                spin_b = states_[contact.body_b].angular_velocity;
+  const auto comes_down = [&](const Vector3& than) {
+    return -input_.dt * dot(contact.normal, cross(spin_b - spin_a, contact.position - than));
+  };
+  const double turning = input_.dt * (input_.bodies[contact.body_a].radius * norm(spin_a) +
+                                      input_.bodies[contact.body_b].radius * norm(spin_b));
+  if (turning > kFastFrom * options_.slop)
+    return separation + std::max(0.0, kFasterWhereFast * comes_down(patch.centre));
+  const ContactPoint& deepest = *patch.deepest;
+  if (deepest.depth - contact.depth < kRound * std::max(deepest.depth, kOfSlop * options_.slop))
+    return separation;
+  const double allowed = kFaster * comes_down(deepest.position);
   return allowed > kLeast * options_.slop ? separation + allowed : separation;
 }
 
@@ -78,29 +107,29 @@ double RowMaker::rebound_of(const ContactPoint& contact, const ContactMeeting& m
   const double approach = -dot(contact.normal, meeting.velocity);
   const double fall =
       -dot(contact.normal, pull_at(contact.body_b, meeting.arm_b) - pull_at(contact.body_a, meeting.arm_a));
-  const double gap = std::max(0.0, -contact.depth);
+  const double gap = std::max(0.0, -depth_at_start(contact, meeting));
   const bool meets = gap < input_.dt * (approach + 0.5 * input_.dt * fall) || gap == 0;
   if (!meets || !(approach > kBouncesAbove * input_.dt * input_.pull_of(contact))) return 0;
   const double square_at_impact = approach * approach + 2 * fall * gap;
   return material.restitution * std::sqrt(std::max(0.0, square_at_impact));
 }
 
-ContactMeeting RowMaker::meeting(const ContactPoint& contact, const ContactPoint& deepest,
+ContactMeeting RowMaker::meeting(const ContactPoint& contact, const ContactPatch& patch,
                                  const Material& material) const {
   ContactMeeting out;
-  out.arm_a = contact.position - states_[contact.body_a].position;
-  out.arm_b = contact.position - states_[contact.body_b].position;
+  out.arm_a = arm_of(contact, states_[contact.body_a]);
+  out.arm_b = arm_of(contact, states_[contact.body_b]);
   out.velocity = velocity_at(contact.body_b, out.arm_b) - velocity_at(contact.body_a, out.arm_a);
-  out.separation = separation_of(contact, deepest);
+  out.separation = separation_of(contact, patch, out);
   out.rebound = rebound_of(contact, out, material);
   return out;
 }
 
-ContactRows RowMaker::rows(const ContactPoint& contact, const ContactPoint& deepest, const SteppedBody& a,
+ContactRows RowMaker::rows(const ContactPoint& contact, const ContactPatch& patch, const SteppedBody& a,
                            const SteppedBody& b, const Material& material,
                            const ContactImpulse& impulse) const {
   const Tangents across(contact.normal);
-  const ContactMeeting meets = meeting(contact, deepest, material);
+  const ContactMeeting meets = meeting(contact, patch, material);
   const auto row = [&](const Vector3& direction) {
     return ContactRow{-gradient(a, direction, meets.arm_a), gradient(b, direction, meets.arm_b)};
   };

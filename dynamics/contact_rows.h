@@ -47,6 +47,12 @@ struct ContactRows {
   double friction_mobility() const { return std::max(first.mobility(), second.mobility()); }
 };
 
+/// The contacts of a pair of bodies that have one normal.
+struct ContactPatch {
+  const ContactPoint* deepest;
+  Vector3 centre;  ///< the mean of those that touch, the deeper counting more
+};
+
 /// Says how the bodies of a contact meet.
 struct ContactMeeting {
   Vector3 arm_a, arm_b;  ///< of the contact, from the centres of mass
@@ -74,22 +80,18 @@ class RowMaker {
     return body != kNoIndex && input_.bodies[body].motion == Motion::moving;
   }
 
-  /// Calls visit(i, contact, deepest) for each contact of a pair, by place in `contacts`. deepest: of its
-  /// patch.
+  /// Calls visit(i, contact, patch) for each contact of a pair, by place in `contacts`.
   template <typename Visit>
   void visit_contacts(std::span<const std::uint32_t> contacts, const Visit& visit) const {
     for (std::size_t begin = 0, end = 0; begin < contacts.size(); begin = end) {
-      const ContactPoint* deepest = &input_.contacts[contacts[begin]];
-      for (end = begin; end < contacts.size() && is_of_patch(contacts[begin], contacts[end]); ++end) {
-        const ContactPoint& contact = input_.contacts[contacts[end]];
-        if (contact.depth > deepest->depth) deepest = &contact;
-      }
-      for (std::size_t i = begin; i < end; ++i) visit(i, input_.contacts[contacts[i]], *deepest);
+      for (end = begin; end < contacts.size() && is_of_patch(contacts[begin], contacts[end]);) ++end;
+      const ContactPatch patch = patch_of(contacts.subspan(begin, end - begin));
+      for (std::size_t i = begin; i < end; ++i) visit(i, input_.contacts[contacts[i]], patch);
     }
   }
-  ContactMeeting meeting(const ContactPoint& contact, const ContactPoint& deepest,
+  ContactMeeting meeting(const ContactPoint& contact, const ContactPatch& patch,
                          const Material& material) const;
-  ContactRows rows(const ContactPoint& contact, const ContactPoint& deepest, const SteppedBody& a,
+  ContactRows rows(const ContactPoint& contact, const ContactPatch& patch, const SteppedBody& a,
                    const SteppedBody& b, const Material& material, const ContactImpulse& impulse) const;
 
   Material material_of(const ContactPoint& contact) const {
@@ -103,7 +105,12 @@ class RowMaker {
 
  private:
   bool is_of_patch(std::uint32_t first, std::uint32_t contact) const;
-  double separation_of(const ContactPoint& contact, const ContactPoint& deepest) const;
+  ContactPatch patch_of(std::span<const std::uint32_t> contacts) const;
+  double separation_of(const ContactPoint& contact, const ContactPatch& patch,
+                       const ContactMeeting& meeting) const;
+  static double depth_at_start(const ContactPoint& contact, const ContactMeeting& meeting) {
+    return contact.depth + contact.time * dot(contact.normal, meeting.velocity);
+  }
   double rebound_of(const ContactPoint& contact, const ContactMeeting& meeting,
                     const Material& material) const;
   Vector3 velocity_at(std::uint32_t body, const Vector3& arm) const;

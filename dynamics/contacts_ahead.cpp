@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
+
+#include "kernels/common/stopwatch.h"
 
 namespace tandem::dynamics {
 namespace {
@@ -10,6 +13,12 @@ namespace {
 // Bodies are stopped before they meet if the gap is at most this part of the smaller one's radius: where two
 // pass by each other, a plane between them says too much about what lies ahead.
 constexpr double kFarthest = 0.25;
+
+// What a pair does in half a step while it goes on touching. It comes together by this part of the thinner
+// one's inner radius at most, and parts by this part of the smaller one's radius: what seems to part faster
+// may have passed through the other body. It touches from one side, by the cosine of the angle between
+// normals: a nut on a bolt does not go on as it does, but as the bolt makes it.
+constexpr double kClosing = 0.5, kParting = 0.01, kOneSide = 0.5;
 
 // Two ways are about the same if the cosine of the angle between them is more than this.
 constexpr double kSameWay = 0.5;
@@ -27,7 +36,7 @@ double rounding_of(const BodiesAhead& of, const ObjectPair& pair) {
 
 ContactsAhead::ContactsAhead(std::span<const AssetView> assets, std::uint32_t threads,
                              const PairFilter* filter)
-    : filter_(filter) {
+    : filter_(filter), inner_radius_(inner_radii(assets)) {
   for (Scene* scene : {&scene_, &moved_}) {
     require(scene->set_threads(threads), *scene);
     require(scene->set_assets(assets), *scene);
@@ -60,13 +69,59 @@ void ContactsAhead::find_near(const BodiesAhead& of) {
   apart_.swap(now_apart_);
 }
 
+std::span<const ObjectPair> ContactsAhead::find_in_middle(std::span<const ObjectPair> touched,
+                                                          const BodiesAhead& of) {
+  const double time = 0.5 * of.dt;
+  pairs_.clear(), of_middle_.clear();
+  std::ranges::set_intersection(touched, fast_, std::back_inserter(pairs_));
+  // What goes far might be beyond the other body by then; what is slow comes to rest.
+  std::erase_if(pairs_, [&](const ObjectPair& pair) {
+    const double way = norm(approach_of(pair, of.states));
+    const double farthest = kFarthest * std::min(of.bodies[pair.a].radius, of.bodies[pair.b].radius);
+    return time * way > farthest || of.dt * (way + turning_of(pair)) <= kFastFrom * of.slop;
+  });
+  clear_moved();
+  const auto pose_in_middle = [&](std::uint32_t body) {
+    return pose_of(of.bodies[body], is_still(body) ? of.states[body] : later(of.states[body], time));
+  };
+  for (const ObjectPair& pair : pairs_) add_moved(pose_in_middle(pair.a), pose_in_middle(pair.b));
+  report_ = find_points_of_moved();
+  in_middle_.clear();
+  for (auto next = points_.begin(); next != points_.end();) {
+    const std::uint32_t first = next->body_a;
+    const ObjectPair& pair = pairs_[first / 2];
+    const std::size_t before = in_middle_.size();
+    const double radius = std::min(of.bodies[pair.a].radius, of.bodies[pair.b].radius);
+    const double thinner =
+        std::min(inner_radius_[of.bodies[pair.a].shape], inner_radius_[of.bodies[pair.b].shape]);
+    const double closing = std::isfinite(thinner) ? kClosing * thinner : of.slop;
+    const double parting = std::min(closing, kParting * radius);
+    bool lasts = true;
+    for (; next != points_.end() && next->body_a == first; ++next) {
+      ContactPoint& point = in_middle_.emplace_back(*next);
+      point.body_a = pair.a, point.body_b = pair.b;
+      point.feature = 0;  // it is of the moved scene
+      point.time = time;
+      const double way = time * of.approach_at(point);
+      lasts = lasts && way <= closing && -way <= parting &&
+              dot(point.normal, in_middle_[before].normal) > kOneSide;
+    }
+    if (lasts)
+      of_middle_.push_back(pair);
+    else
+      in_middle_.resize(before);
+  }
+  return of_middle_;
+}
+
 void ContactsAhead::add_to(std::vector<ContactPoint>& found, std::span<const ObjectPair> kept,
                            const BodiesAhead& of) {
+  add_points(in_middle_, found);
   find_distances(found, kept, of.overlap());
   find_approaches(of);
   if (approaches_.empty()) return;
   find_points(of);
-  add_points_to(found);
+  add_points(points_, found);
 }
 
 AheadState ContactsAhead::save() const {
@@ -235,7 +290,7 @@ std::span<const ObjectPair> ContactsAhead::add_missed(std::vector<ContactPoint>&
     const ObjectPair pair = pair_of(point);
     if (missed_.empty() || missed_.back() != pair) missed_.push_back(pair);
   }
-  add_points_to(found);
+  add_points(points_, found);
   return missed_;
 }
 
@@ -266,18 +321,24 @@ void ContactsAhead::add_moved(const Instance& a, const Instance& b) {
 }
 
 // Finds the contacts of moved_pairs_: points_, of which pair i has bodies 2 i and 2 i + 1.
-void ContactsAhead::find_points_of_moved() {
+FinderReport ContactsAhead::find_points_of_moved() {
+  FinderReport report;
+  Stopwatch stopwatch;
   require(moved_.place(instances_), moved_);
+  report.times.update = stopwatch.lap();
   require(contacts_.find(moved_, moved_pairs_, {}), moved_);
+  report.times.traversal = stopwatch.lap();
   require(manifolds_.find(moved_, contacts_, {.match_previous = false}), moved_);
-  ContactStatistics statistics;
-  take_points(manifolds_, moved_pairs_, points_, statistics);
+  take_points(manifolds_, moved_pairs_, points_, report.contacts);
+  report.times.generation = stopwatch.lap();
+  report.counters = contacts_.counters();
+  return report;
 }
 
-// Adds points_ to those found, which come by ascending pair and go on doing so.
-void ContactsAhead::add_points_to(std::vector<ContactPoint>& found) const {
+// Adds points to those found, which come by ascending pair and go on doing so.
+void ContactsAhead::add_points(const std::vector<ContactPoint>& points, std::vector<ContactPoint>& found) {
   const auto middle = static_cast<std::ptrdiff_t>(found.size());
-  found.insert(found.end(), points_.begin(), points_.end());
+  found.insert(found.end(), points.begin(), points.end());
   std::ranges::inplace_merge(found, found.begin() + middle, {},
                              [](const ContactPoint& contact) { return pair_of(contact); });
 }

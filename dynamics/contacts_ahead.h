@@ -41,9 +41,21 @@ class ContactsAhead {
   std::span<const ObjectPair> slow() const { return slow_; }
   std::span<const ObjectPair> fast() const { return fast_; }
 
-  /// Adds the contacts ahead of pairs to those found, so that these still come by ascending pair. Pairs that
-  /// have contacts, slow ones that are kept, and those of two idle bodies have none. The result depends on
-  /// nothing but the arguments. Condition: find_near() was called for the same bodies. Throws QueryFailed.
+  /// Finds the contacts that fast pairs which touched will have in the middle of the step, if the bodies go
+  /// on as they do. A body that rolls, swings or slides takes its contacts along: those of the middle act for
+  /// the whole step with an error of second order in it, those of the start with one of first order. Result:
+  /// the pairs that have such contacts, ascending, valid until the next call of a function that finds any;
+  /// add_to() adds them. touched: ascending. Condition: find_near() was called for the same bodies. Throws
+  /// QueryFailed.
+  std::span<const ObjectPair> find_in_middle(std::span<const ObjectPair> touched, const BodiesAhead& of);
+
+  /// Returns the report of the last find_in_middle().
+  const FinderReport& report() const { return report_; }
+
+  /// Adds the contacts of the middle, and the contacts ahead of pairs, to those found, so that these still
+  /// come by ascending pair. Pairs that have contacts, slow ones that are kept, and those of two idle bodies
+  /// have none. The result depends on nothing but the arguments. Condition: find_near() was called for the
+  /// same bodies. Throws QueryFailed.
   void add_to(std::vector<ContactPoint>& found, std::span<const ObjectPair> kept, const BodiesAhead& of);
 
   /// Adds to those found what a step missed: contacts of slow pairs that did not touch at its start and are
@@ -103,15 +115,17 @@ class ContactsAhead {
                       std::span<const BodyState> end);
   void clear_moved();
   void add_moved(const Instance& a, const Instance& b);
-  void find_points_of_moved();
-  void add_points_to(std::vector<ContactPoint>& found) const;
+  FinderReport find_points_of_moved();
+  static void add_points(const std::vector<ContactPoint>& points, std::vector<ContactPoint>& found);
 
   const PairFilter* filter_;
-  Scene scene_, moved_;  // all bodies; two of each approach, moved
+  std::vector<double> inner_radius_;  // of each shape; infinite where it is not closed
+  Scene scene_, moved_;               // all bodies; two of each approach, moved
   DistanceQuery distances_;
   ContactQuery contacts_;
   ManifoldQuery manifolds_;
 
+  FinderReport report_;
   std::vector<BodyState> before_;  // of the last call
   Ways ways_;
   std::vector<Apart> apart_, now_apart_;
@@ -119,10 +133,10 @@ class ContactsAhead {
   std::vector<Motion> motion_;
   std::vector<double> turning_;  // how fast points of each body move by its spin, at most
   std::vector<Instance> instances_;
-  std::vector<ObjectPair> pairs_, moved_pairs_, missed_;
+  std::vector<ObjectPair> pairs_, moved_pairs_, of_middle_, missed_;
   std::vector<Asked> asked_;
   std::vector<Approach> approaches_;
-  std::vector<ContactPoint> points_;
+  std::vector<ContactPoint> points_, in_middle_;
 };
 
 }  // namespace tandem::dynamics

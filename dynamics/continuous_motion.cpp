@@ -19,19 +19,6 @@ constexpr double kMostSamples = 256;
 // Each round stops bodies earlier, until none that has stopped is in another one's way.
 constexpr int kMostRounds = 8;
 
-// Half the least side of the bounds; of a shape that is not closed, which has no inside to be passed through
-// within, infinite.
-double inner_radius_of(const AssetView& shape) {
-  if (!shape.level().closed) return INFINITY;
-  double least = INFINITY;
-  for (int k = 0; k < 3; ++k) {
-    const double side =
-        static_cast<double>(shape.header->upper[k]) - static_cast<double>(shape.header->lower[k]);
-    least = std::min(least, 0.5 * side);
-  }
-  return least;
-}
-
 Quaternion turned(const Quaternion& orientation, const Vector3& turn) {
   return normalized(rotation_by(turn) * orientation);
 }
@@ -40,11 +27,10 @@ Quaternion turned(const Quaternion& orientation, const Vector3& turn) {
 
 ContinuousMotion::ContinuousMotion(std::span<const AssetView> shapes, std::uint32_t threads,
                                    const PairFilter* filter)
-    : filter_(filter) {
+    : filter_(filter), inner_radius_(inner_radii(shapes)) {
   require(moving_.set_threads(threads), moving_);
   require(moving_.set_assets(shapes), moving_);
   require(two_.set_assets(shapes), two_);
-  for (const AssetView& shape : shapes) inner_radius_.push_back(inner_radius_of(shape));
 }
 
 bool ContinuousMotion::find_fast(std::span<const BodyProperties> bodies, std::span<const BodyState> before,

@@ -76,10 +76,10 @@ class ProblemMaker {
     for (const std::uint32_t contact : contacts) pair.impulse += impulses_[contact].turning;
     const Material material = rows_.material_of(input_.contacts[contacts[0]]);
     rows_.visit_contacts(
-        contacts, [&](std::size_t k, const ContactPoint& contact, const ContactPoint& deepest) {
+        contacts, [&](std::size_t k, const ContactPoint& contact, const ContactPatch& patch) {
           const std::size_t i = begin + k;
           const ContactRows rows =
-              rows_.rows(contact, deepest, bodies_[a], bodies_[b], material, impulses_[contacts[k]]);
+              rows_.rows(contact, patch, bodies_[a], bodies_[b], material, impulses_[contacts[k]]);
           problem_.a[i] = a, problem_.b[i] = b;
           problem_.normal[i] = rows.normal, problem_.first[i] = rows.first, problem_.second[i] = rows.second;
           problem_.first_direction[i] = rows.first_direction,

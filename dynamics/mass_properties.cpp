@@ -269,4 +269,18 @@ double radius_about(const Vector3& centre, const AssetView& asset) {
   return std::sqrt(most);
 }
 
+std::vector<double> inner_radii(std::span<const AssetView> shapes) {
+  std::vector<double> out;
+  for (const AssetView& shape : shapes) {
+    double least = INFINITY;
+    for (int k = 0; k < 3; ++k) {
+      const double side =
+          static_cast<double>(shape.header->upper[k]) - static_cast<double>(shape.header->lower[k]);
+      if (shape.level().closed) least = std::min(least, 0.5 * side);
+    }
+    out.push_back(least);
+  }
+  return out;
+}
+
 }  // namespace tandem::dynamics

@@ -1,6 +1,7 @@
 #pragma once
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -44,5 +45,9 @@ MassReport mass_properties(const AssetView& asset);
 
 /// Returns the distance of the farthest vertex from a point in the file's coordinates.
 double radius_about(const Vector3& centre, const AssetView& asset);
+
+/// Returns for each shape half the least side of its bounds; of one that is not closed, which has no inside
+/// to be passed through within, infinite.
+std::vector<double> inner_radii(std::span<const AssetView> shapes);
 
 }  // namespace tandem::dynamics

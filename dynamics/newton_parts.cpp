@@ -42,7 +42,10 @@ class Parts {
     driven_.erase(std::unique(driven_.begin(), driven_.end()), driven_.end());
     for (const ContactPoint& contact : contacts_) {
       anchors_.push_back(anchor_of(contact, states_));
-      normals_.push_back(rotated(conjugated(states_[contact.body_a].orientation), contact.normal));
+      normals_.push_back(normal_in_a(contact, states_));
+    }
+    for (std::size_t i = 0; i < contacts_.size(); ++i) {
+      if (contacts_[i].time > 0) move_contact(i);
     }
   }
 
@@ -59,10 +62,7 @@ class Parts {
     if (!residual) return {};
     apply_solution(problem, part, states_, impulses);
     for (const std::uint32_t body : driven_) advance(input_.bodies[body], states_[body], {}, {}, dt);
-    for (std::size_t i = 0; i < contacts_.size(); ++i) {
-      contacts_[i].normal = normalized(rotated(states_[contacts_[i].body_a].orientation, normals_[i]));
-      carry(contacts_[i], anchors_[i], states_);
-    }
+    for (std::size_t i = 0; i < contacts_.size(); ++i) move_contact(i);
     for (const std::uint32_t i : one_.joints) {
       const Joint& joint = input_.joints[i];
       follow(joint, state_of(joint.a, states_), state_of(joint.b, states_), dt, input_.joint_memory[i]);
@@ -73,6 +73,12 @@ class Parts {
   std::span<const BodyState> states() const { return states_; }
 
  private:
+  // Moves a contact to where the bodies are.
+  void move_contact(std::size_t i) {
+    contacts_[i].normal = normalized(rotated(states_[contacts_[i].body_a].orientation, normals_[i]));
+    carry(contacts_[i], anchors_[i], states_);
+  }
+
   const StepInput& input_;
   std::uint32_t count_;
   Islands one_;

@@ -8,17 +8,22 @@
 namespace tandem::dynamics {
 namespace {
 
-void take(StepRecord& record, const FinderReport& report) {
-  static_cast<DetectionTimes&>(record) = report.times;
-  record.object_pairs = report.counters.object_pairs;
-  record.kept_pairs = report.kept_pairs;
-  record.block_pairs = report.counters.block_pairs;
-  record.candidates = report.counters.candidates;
-  record.triangle_pairs = report.counters.contacts;
-  record.segments = report.contacts.counters.segments;
-  record.patches = report.contacts.counters.manifolds;
-  record.open_curves = report.contacts.counters.open_curves;
-  record.contact_area = report.contacts.area;
+void add(StepRecord& record, const FinderReport& report) {
+  record.update += report.times.update;
+  record.broad_phase += report.times.broad_phase;
+  record.traversal += report.times.traversal;
+  record.triangle_tests += report.times.triangle_tests;
+  record.transfer += report.times.transfer;
+  record.generation += report.times.generation;
+  record.object_pairs += report.counters.object_pairs;
+  record.kept_pairs += report.kept_pairs;
+  record.block_pairs += report.counters.block_pairs;
+  record.candidates += report.counters.candidates;
+  record.triangle_pairs += report.counters.contacts;
+  record.segments += report.contacts.counters.segments;
+  record.patches += report.contacts.counters.manifolds;
+  record.open_curves += report.contacts.counters.open_curves;
+  record.contact_area += report.contacts.area;
 }
 
 }  // namespace
@@ -66,20 +71,24 @@ void Simulation::find_contacts(StepRecord& record) {
   const std::vector<ObjectPair> touching = cache_.pairs();
   Keeping keeping = {touching, options_.solver.slop};
   Stopwatch stopwatch;
-  std::vector<ObjectPair> remembered;
+  std::vector<ObjectPair> remembered, near;
   if (parts_.ahead) {
     parts_.ahead->find_near(ahead);
-    std::ranges::set_union(keeping.remembered, parts_.ahead->slow(), std::back_inserter(remembered));
-    keeping.remembered = remembered, keeping.near = parts_.ahead->fast();
+    record.broad_phase += stopwatch.lap();
+    const std::span<const ObjectPair> known = parts_.ahead->find_in_middle(touching, ahead);
+    add(record, parts_.ahead->report());
+    std::vector<ObjectPair> all;
+    std::ranges::set_union(touching, parts_.ahead->slow(), std::back_inserter(all));
+    std::ranges::set_difference(all, known, std::back_inserter(remembered));
+    std::ranges::set_difference(parts_.ahead->fast(), known, std::back_inserter(near));
+    keeping.remembered = remembered, keeping.near = near;
   }
-  const double near_seconds = stopwatch.lap();
   found_ = parts_.contacts->find(poses(), idle, keeping);
-  take(record, parts_.contacts->report());
+  add(record, parts_.contacts->report());
   stopwatch.lap();
   if (parts_.ahead) parts_.ahead->add_to(found_, parts_.contacts->kept(), ahead);
   drop_contacts_of_unmoved();
   cache_.update(found_, parts_.contacts->kept(), ahead);
-  record.broad_phase += near_seconds;
   record.generation += stopwatch.lap();
   record.contacts = cache_.contacts().size();
   for (const ContactPoint& contact : cache_.contacts()) {

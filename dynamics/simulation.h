@@ -70,7 +70,8 @@ struct SimulationParts {
   std::vector<Joint> joints = {};
 };
 
-/// Moves rigid bodies, step by step: contacts where the bodies stand, velocities with gravity, contacts
+/// Moves rigid bodies, step by step: contacts where the bodies stand, or will in the middle of the step
+/// (ContactsAhead), velocities with gravity, contacts
 /// solved for, positions by the new velocities (semi-implicit Euler). Bodies that have moved against each
 /// other by no more than the slop keep their contacts. With warm start, a step that has no impulse of the
 /// step before makes ten times the sweeps. The bytes are the same for any number of threads.

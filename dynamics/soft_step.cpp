@@ -273,8 +273,8 @@ void SoftSolver::fill_pair(const Step& step, const Pair& pair) {
   for (const std::uint32_t i : contacts) turning += step.impulses[i].turning;
   put(turning / substeps, turns.impulse, lane);
   step.rows.visit_contacts(
-      contacts, [&](std::size_t i, const ContactPoint& contact, const ContactPoint& deepest) {
-        const ContactMeeting meets = step.rows.meeting(contact, deepest, material);
+      contacts, [&](std::size_t i, const ContactPoint& contact, const ContactPatch& patch) {
+        const ContactMeeting meets = step.rows.meeting(contact, patch, material);
         const ContactImpulse& impulse = step.impulses[contacts[i]];
         const auto [first, second] = Tangents(contact.normal);
         SoftNormal& normal = normals_[group.first + i];

@@ -53,11 +53,12 @@ ContactPatch RowMaker::patch_of(std::span<const std::uint32_t> contacts) const {
 }
 
 // A gap may close; what is in contact comes no deeper, or bodies would rock within the slop. But a body that
-// rolls brings the points before it down: they may go on as they turn, and faster. Bodies that turn by no
-// more than the slop rest: there only points of a patch that is clearly round may, if that is much.
+// rolls brings the points before it down: they may go on as they turn, and faster. Bodies that turn slowly,
+// or have the contacts of the start, come to rest: there only points of a patch that is clearly round may, if
+// that is much.
 double RowMaker::separation_of(const ContactPoint& contact, const ContactPatch& patch,
                                const ContactMeeting& meeting) const {
-  constexpr double kFasterWhereFast = 2, kRound = 0.7, kOfSlop = 0.25, kFaster = 4, kLeast = 0.3;
+  constexpr double kFasterOfMiddle = 2, kRound = 0.7, kOfSlop = 0.25, kFaster = 4, kLeast = 0.3;
   // What comes out by itself is not pushed out.
   const double depth = std::min(contact.depth, depth_at_start(contact, meeting));
   const double separation = depth < 0 ? -depth : std::min(0.0, options_.slop - depth);
@@ -68,8 +69,8 @@ double RowMaker::separation_of(const ContactPoint& contact, const ContactPatch& 
   };
   const double turning = input_.dt * (input_.bodies[contact.body_a].radius * norm(spin_a) +
                                       input_.bodies[contact.body_b].radius * norm(spin_b));
-  if (turning > kFastFrom * options_.slop)
-    return separation + std::max(0.0, kFasterWhereFast * comes_down(patch.centre));
+  if (contact.time > 0 && turning > kFastFrom * options_.slop)
+    return separation + std::max(0.0, kFasterOfMiddle * comes_down(patch.centre));
   const ContactPoint& deepest = *patch.deepest;
   if (deepest.depth - contact.depth < kRound * std::max(deepest.depth, kOfSlop * options_.slop))
     return separation;

@@ -92,11 +92,10 @@ std::span<const ObjectPair> ContactsAhead::find_in_middle(std::span<const Object
     const ObjectPair& pair = pairs_[first / 2];
     const std::size_t before = in_middle_.size();
     const double radius = std::min(of.bodies[pair.a].radius, of.bodies[pair.b].radius);
-    const double thinner =
-        std::min(inner_radius_[of.bodies[pair.a].shape], inner_radius_[of.bodies[pair.b].shape]);
-    const double closing = std::isfinite(thinner) ? kClosing * thinner : of.slop;
+    const double of_a = inner_radius_[of.bodies[pair.a].shape], of_b = inner_radius_[of.bodies[pair.b].shape];
+    const double closing = kClosing * std::min(of_a, of_b);
     const double parting = std::min(closing, kParting * radius);
-    bool lasts = true;
+    bool lasts = std::isfinite(of_a) && std::isfinite(of_b);
     for (; next != points_.end() && next->body_a == first; ++next) {
       ContactPoint& point = in_middle_.emplace_back(*next);
       point.body_a = pair.a, point.body_b = pair.b;

@@ -72,10 +72,11 @@ void Simulation::find_contacts(StepRecord& record) {
   Keeping keeping = {touching, options_.solver.slop};
   Stopwatch stopwatch;
   std::vector<ObjectPair> remembered, near;
+  std::span<const ObjectPair> known;  // of the middle
   if (parts_.ahead) {
     parts_.ahead->find_near(ahead);
     record.broad_phase += stopwatch.lap();
-    const std::span<const ObjectPair> known = parts_.ahead->find_in_middle(touching, ahead);
+    known = parts_.ahead->find_in_middle(touching, ahead);
     add(record, parts_.ahead->report());
     std::vector<ObjectPair> all;
     std::ranges::set_union(touching, parts_.ahead->slow(), std::back_inserter(all));
@@ -86,6 +87,10 @@ void Simulation::find_contacts(StepRecord& record) {
   found_ = parts_.contacts->find(poses(), idle, keeping);
   add(record, parts_.contacts->report());
   stopwatch.lap();
+  // A finder that asks about all pairs has found these too.
+  std::erase_if(found_, [&](const ContactPoint& contact) {
+    return std::ranges::binary_search(known, pair_of(contact));
+  });
   if (parts_.ahead) parts_.ahead->add_to(found_, parts_.contacts->kept(), ahead);
   drop_contacts_of_unmoved();
   cache_.update(found_, parts_.contacts->kept(), ahead);

@@ -300,7 +300,7 @@ class Resuming(SimulateTest):
 
 class Frames(SimulateTest):
     def test_a_frame_is_a_scene_with_the_contacts_of_the_run(self):
-        self.simulate("pile", *self.cows(), "--count", "20", "--frames", "80", "--trajectory", "20", "--ask-all")
+        self.simulate("pile", *self.cows(), "--count", "20", "--frames", "80", "--trajectory", "20", "--ask-all", "--solver", "sweeps")
         for frame in (0, 60):
             scene = self.outputs / f"frame{frame}.h5"
             self.passes("frame", self.run_file, "--frame", str(frame), "-o", scene)

@@ -72,7 +72,8 @@ void ContactsAhead::find_near(const BodiesAhead& of) {
 std::span<const ObjectPair> ContactsAhead::find_in_middle(std::span<const ObjectPair> touched,
                                                           const BodiesAhead& of) {
   const double time = 0.5 * of.dt;
-  pairs_.clear(), of_middle_.clear();
+  pairs_.clear(), of_middle_.clear(), in_middle_.clear();
+  report_ = {};
   std::ranges::set_intersection(touched, fast_, std::back_inserter(pairs_));
   // What goes far might be beyond the other body by then; what is slow comes to rest.
   std::erase_if(pairs_, [&](const ObjectPair& pair) {
@@ -80,13 +81,13 @@ std::span<const ObjectPair> ContactsAhead::find_in_middle(std::span<const Object
     const double farthest = kFarthest * std::min(of.bodies[pair.a].radius, of.bodies[pair.b].radius);
     return time * way > farthest || of.dt * (way + turning_of(pair)) <= kFastFrom * of.slop;
   });
+  if (pairs_.empty()) return of_middle_;
   clear_moved();
   const auto pose_in_middle = [&](std::uint32_t body) {
     return pose_of(of.bodies[body], is_still(body) ? of.states[body] : later(of.states[body], time));
   };
   for (const ObjectPair& pair : pairs_) add_moved(pose_in_middle(pair.a), pose_in_middle(pair.b));
   report_ = find_points_of_moved();
-  in_middle_.clear();
   for (auto next = points_.begin(); next != points_.end();) {
     const std::uint32_t first = next->body_a;
     const ObjectPair& pair = pairs_[first / 2];

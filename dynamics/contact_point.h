@@ -36,12 +36,12 @@ struct ContactAnchor {
 /// Returns where a body is after some seconds if it goes on as it does, with the velocities of now.
 BodyState later(const BodyState& state, double seconds);
 
-/// The contact as a body's own velocities see it: from its centre of mass, at the contact's time.
+/// Returns where a contact is, as seen from the centre of mass of one of its bodies at the contact's time.
 inline Vector3 arm_of(const ContactPoint& contact, const BodyState& state) {
   return contact.position - (state.position + contact.time * state.velocity);
 }
 
-/// Takes the contact's bodies as they stand when the step begins.
+/// Returns where a contact is in its bodies. states: those when the step begins.
 ContactAnchor anchor_of(const ContactPoint& contact, std::span<const BodyState> states);
 
 /// Returns the contact's normal in the frame of a.

@@ -14,9 +14,9 @@ namespace {
 // pass by each other, a plane between them says too much about what lies ahead.
 constexpr double kFarthest = 0.25;
 
-// What a pair does in half a step while it goes on touching. It comes together by this part of the thinner
-// one's inner radius at most, and parts by this part of the smaller one's radius: what seems to part faster
-// may have passed through the other body. It touches from one side, by the cosine of the angle between
+// A pair goes on touching if it does no more than this in half a step. It comes together by this part of the
+// thinner one's inner radius at most, and parts by this part of the smaller one's radius: what seems to part
+// faster may have passed through the other body. It touches from one side, by the cosine of the angle between
 // normals: a nut on a bolt does not go on as it does, but as the bolt makes it.
 constexpr double kClosing = 0.5, kParting = 0.01, kOneSide = 0.5;
 

@@ -54,8 +54,8 @@ class ContactsAhead {
 
   /// Adds the contacts of the middle, and the contacts ahead of pairs, to those found, so that these still
   /// come by ascending pair. Pairs that have contacts, slow ones that are kept, and those of two idle bodies
-  /// have none. The result depends on nothing but the arguments. Condition: find_near() was called for the
-  /// same bodies. Throws QueryFailed.
+  /// have none. The result depends on nothing but the arguments. Condition: find_near() and find_in_middle()
+  /// were called for the same bodies. Throws QueryFailed.
   void add_to(std::vector<ContactPoint>& found, std::span<const ObjectPair> kept, const BodiesAhead& of);
 
   /// Adds to those found what a step missed: contacts of slow pairs that did not touch at its start and are

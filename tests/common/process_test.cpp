@@ -12,7 +12,7 @@
 namespace tandem {
 namespace {
 
-// What the system does to a process that reads a page of a mapped file whose disk has failed.
+// This is what the system does to a process that reads a page of a mapped file whose disk has failed.
 void lose_a_page() {
 #if defined(_WIN32)
   RaiseException(EXCEPTION_IN_PAGE_ERROR, 0, 0, nullptr);

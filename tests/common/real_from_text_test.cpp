@@ -12,7 +12,8 @@ namespace {
 
 constexpr double kUntouched = 0.375;
 
-/// What a reader found: the number's bits (of not-a-number alone that it is one), its end, and its status.
+/// This is what a reader found: the number's bits (of not-a-number alone that it is one), its end, and its
+/// status.
 struct Found {
   std::uint64_t bits;
   std::ptrdiff_t length;

@@ -9,8 +9,8 @@ namespace tandem {
 /// GMP's, which are as many times as fast.
 int oracle_share();
 
-/// Whether the triangles meet, as CGAL finds by rational numbers: a flat triangle is dispatched as the
-/// segment or point that it is.
+/// Returns whether the triangles meet, as CGAL finds by rational numbers: a flat triangle is dispatched as
+/// the segment or point that it is.
 bool oracle_contact(const TrianglePair& pair);
 
 /// The distance of two triangles by rational numbers.

@@ -269,7 +269,7 @@ TEST_P(Map, MovesAndReopens) {
   EXPECT_EQ(second.data(), nullptr);
 }
 
-// Where a system refuses to replace a mapped file, this one stays whole.
+// A mapped file stays whole where a system refuses to replace it.
 TEST_P(Map, KeepsWhatItHoldsWhileTheFileIsReplaced) {
   const std::string path = write_asset("a.bvh", 10);
   MappedAsset asset, other;

@@ -18,34 +18,34 @@ struct BodiesAhead {
   std::span<const Pull> pulls;  ///< of each body
   double slop;
 
-  bool is_idle(std::uint32_t body) const { return !idle.empty() && idle[body] != 0; }
+  TANDEM_HD bool is_idle(std::uint32_t body) const { return !idle.empty() && idle[body] != 0; }
 
   /// Returns how far two bodies may fall towards each other along a unit vector: as far as contacts give one
   /// of them what gravity and forces give, and as much to the other.
-  double fall_along(const ObjectPair& pair, const Vector3& direction) const {
+  TANDEM_HD double fall_along(const ObjectPair& pair, const Vector3& direction) const {
     const Pull &a = pulls[pair.a], &b = pulls[pair.b];
     const double pull = std::max(std::fabs(dot(a.linear, direction)), std::fabs(dot(b.linear, direction)));
     return kFall * (pull + a.turning + b.turning) * dt * dt;
   }
   /// Returns how b may fall as seen from a while something holds one of them: the fall that leads further
   /// along a direction.
-  Vector3 fall_towards(const ObjectPair& pair, const Vector3& direction) const {
+  TANDEM_HD Vector3 fall_towards(const ObjectPair& pair, const Vector3& direction) const {
     const Vector3 of_b = pulls[pair.b].linear, of_a = -pulls[pair.a].linear;
     return (kFall * dt * dt) * (dot(of_b, direction) > dot(of_a, direction) ? of_b : of_a);
   }
-  double fall(const ObjectPair& pair) const { return std::max(fall(pair.a), fall(pair.b)); }
-  double fall(std::uint32_t body) const { return kFall * pulls[body].most() * dt * dt; }
+  TANDEM_HD double fall(const ObjectPair& pair) const { return std::max(fall(pair.a), fall(pair.b)); }
+  TANDEM_HD double fall(std::uint32_t body) const { return kFall * pulls[body].most() * dt * dt; }
 
   /// A length in which contacts are told well.
-  double overlap() const { return 0.5 * slop; }
+  TANDEM_HD double overlap() const { return 0.5 * slop; }
 
   /// Returns how fast the bodies approach each other at a contact, along its normal.
-  double approach_at(const ContactPoint& contact) const {
+  TANDEM_HD double approach_at(const ContactPoint& contact) const {
     return dot(contact.normal, velocity_at(contact.body_a, contact) - velocity_at(contact.body_b, contact));
   }
 
   /// Returns whether a contact is a gap that the step will not close.
-  bool is_far(const ContactPoint& contact) const {
+  TANDEM_HD bool is_far(const ContactPoint& contact) const {
     if (contact.depth >= -overlap()) return false;
     const double approach = approach_at(contact);
     return -contact.depth > dt * (approach > 0 ? approach : 0) +
@@ -55,7 +55,7 @@ struct BodiesAhead {
  private:
   static constexpr double kFall = 2;
 
-  Vector3 velocity_at(std::uint32_t body, const ContactPoint& contact) const {
+  TANDEM_HD Vector3 velocity_at(std::uint32_t body, const ContactPoint& contact) const {
     if (is_idle(body)) return {};
     const BodyState& state = states[body];
     return state.velocity + cross(state.angular_velocity, arm_of(contact, state));

@@ -23,7 +23,7 @@ struct ContactPoint {
                     ///< go on as they did
 };
 
-inline ObjectPair pair_of(const ContactPoint& contact) {
+TANDEM_HD inline ObjectPair pair_of(const ContactPoint& contact) {
   return {contact.body_a, contact.body_b};
 }
 
@@ -34,26 +34,50 @@ struct ContactAnchor {
 };
 
 /// Returns where a body is after some seconds if it goes on as it does, with the velocities of now.
-BodyState later(const BodyState& state, double seconds);
+TANDEM_HD inline BodyState later(const BodyState& state, double seconds) {
+  BodyState out = state;
+  if (seconds == 0) return out;
+  out.position += seconds * state.velocity;
+  out.orientation = normalized(rotation_by(seconds * state.angular_velocity) * state.orientation);
+  return out;
+}
 
 /// Returns where a contact is, as seen from the centre of mass of one of its bodies at the contact's time.
-inline Vector3 arm_of(const ContactPoint& contact, const BodyState& state) {
+TANDEM_HD inline Vector3 arm_of(const ContactPoint& contact, const BodyState& state) {
   return contact.position - (state.position + contact.time * state.velocity);
 }
 
 /// Returns where a contact is in its bodies. states: those when the step begins.
-ContactAnchor anchor_of(const ContactPoint& contact, std::span<const BodyState> states);
+TANDEM_HD inline ContactAnchor anchor_of(const ContactPoint& contact, std::span<const BodyState> states) {
+  return {into_body(later(states[contact.body_a], contact.time), contact.position),
+          into_body(later(states[contact.body_b], contact.time), contact.position), contact.depth};
+}
 
 /// Returns the contact's normal in the frame of a.
-Vector3 normal_in_a(const ContactPoint& contact, std::span<const BodyState> states);
+TANDEM_HD inline Vector3 normal_in_a(const ContactPoint& contact, std::span<const BodyState> states) {
+  return rotated(conjugated(later(states[contact.body_a], contact.time).orientation), contact.normal);
+}
 
 /// Moves a contact to the middle of where its two bodies have carried the point, and corrects its depth by
 /// what these have moved apart along the normal; the depth may become negative. The normal stays. The
 /// contact's time becomes 0.
-void carry(ContactPoint& contact, const ContactAnchor& anchor, std::span<const BodyState> states);
+TANDEM_HD inline void carry(ContactPoint& contact, const ContactAnchor& anchor,
+                            std::span<const BodyState> states) {
+  const Vector3 on_a = into_world(states[contact.body_a], anchor.in_a);
+  const Vector3 on_b = into_world(states[contact.body_b], anchor.in_b);
+  contact.position = 0.5 * (on_a + on_b);
+  contact.depth = anchor.depth - dot(contact.normal, on_b - on_a);
+  contact.time = 0;
+}
 
 /// Returns how fast the bodies approach each other at the contact, along its normal.
-double approach_of(const ContactPoint& contact, std::span<const BodyState> states);
+TANDEM_HD inline double approach_of(const ContactPoint& contact, std::span<const BodyState> states) {
+  const auto velocity = [&](std::uint32_t body) {
+    const BodyState& state = states[body];
+    return state.velocity + cross(state.angular_velocity, arm_of(contact, state));
+  };
+  return dot(contact.normal, velocity(contact.body_a) - velocity(contact.body_b));
+}
 
 /// The impulse of a contact in a step: an impulse on b, the opposite one on a.
 struct ContactImpulse {

@@ -12,7 +12,7 @@ struct ContactRow {
   Vector6 a, b;
 
   /// Returns by how much an impulse of 1 changes w.
-  double mobility() const { return square(a) + square(b); }
+  TANDEM_HD double mobility() const { return square(a) + square(b); }
 };
 
 /// Turns velocities of a body into those in which its mass is 1: y = (sqrt(m) v, F^-1 spin), where F F^T is
@@ -40,11 +40,11 @@ struct ContactRows {
   double rebound;     ///< velocity along the normal that restitution asks for, or 0
   Vector3 impulse;    ///< along normal, first, second, as a whole step would need it
 
-  double speed(const ContactRow& row, const Vector6& y_a, const Vector6& y_b) const {
+  TANDEM_HD double speed(const ContactRow& row, const Vector6& y_a, const Vector6& y_b) const {
     return dot(row.a, y_a) + dot(row.b, y_b);
   }
   /// Returns one mobility for both directions, or friction would not oppose the slip.
-  double friction_mobility() const { return std::max(first.mobility(), second.mobility()); }
+  TANDEM_HD double friction_mobility() const { return std::max(first.mobility(), second.mobility()); }
 };
 
 /// The contacts of a pair of bodies that have one normal.
@@ -65,70 +65,234 @@ struct ContactMeeting {
 struct Tangents {
   Vector3 first, second;
 
-  explicit Tangents(const Vector3& normal) : first(unit_orthogonal(normal)), second(cross(normal, first)) {}
+  TANDEM_HD explicit Tangents(const Vector3& normal)
+      : first(unit_orthogonal(normal)), second(cross(normal, first)) {}
+};
+
+/// The numbers of a step that rows are made of.
+struct StepNumbers : StepBodies {
+  std::span<const BodyState> states;  ///< at the start
+  SolverOptions options;
 };
 
 /// Makes rows of the contacts of a step.
 class RowMaker {
  public:
-  RowMaker(const StepInput& input, std::span<const BodyState> states, const SolverOptions& options)
-      : input_(input), states_(states), options_(options) {}
+  TANDEM_HD explicit RowMaker(const StepNumbers& step) : step_(step) {}
 
-  SteppedBody body(std::uint32_t body) const;
+  TANDEM_HD SteppedBody body(std::uint32_t body) const;
   /// body: kNoIndex is one that is not.
-  bool is_moved(std::uint32_t body) const {
-    return body != kNoIndex && input_.bodies[body].motion == Motion::moving;
+  TANDEM_HD bool is_moved(std::uint32_t body) const {
+    return body != kNoIndex && step_.bodies[body].motion == Motion::moving;
   }
 
   /// Calls visit(i, contact, patch) for each contact of a pair, by place in `contacts`.
   template <typename Visit>
-  void visit_contacts(std::span<const std::uint32_t> contacts, const Visit& visit) const {
+  TANDEM_HD void visit_contacts(std::span<const std::uint32_t> contacts, const Visit& visit) const {
     for (std::size_t begin = 0, end = 0; begin < contacts.size(); begin = end) {
       for (end = begin; end < contacts.size() && is_of_patch(contacts[begin], contacts[end]);) ++end;
       const ContactPatch patch = patch_of(contacts.subspan(begin, end - begin));
-      for (std::size_t i = begin; i < end; ++i) visit(i, input_.contacts[contacts[i]], patch);
+      for (std::size_t i = begin; i < end; ++i) visit(i, step_.contacts[contacts[i]], patch);
     }
   }
-  ContactMeeting meeting(const ContactPoint& contact, const ContactPatch& patch,
-                         const Material& material) const;
-  ContactRows rows(const ContactPoint& contact, const ContactPatch& patch, const SteppedBody& a,
-                   const SteppedBody& b, const Material& material, const ContactImpulse& impulse) const;
+  TANDEM_HD ContactMeeting meeting(const ContactPoint& contact, const ContactPatch& patch,
+                                   const Material& material) const;
+  TANDEM_HD ContactRows rows(const ContactPoint& contact, const ContactPatch& patch, const SteppedBody& a,
+                             const SteppedBody& b, const Material& material,
+                             const ContactImpulse& impulse) const;
 
-  Material material_of(const ContactPoint& contact) const {
-    return mixed_material(input_.bodies[contact.body_a], input_.bodies[contact.body_b], options_);
+  TANDEM_HD Material material_of(const ContactPoint& contact) const {
+    return mixed_material(step_.bodies[contact.body_a], step_.bodies[contact.body_b], step_.options);
   }
 
   /// Returns how fast body b of a contact is turned against a by what contacts do not move.
-  Vector3 turning_drive(const ContactPoint& contact) const {
+  TANDEM_HD Vector3 turning_drive(const ContactPoint& contact) const {
     return spin_driven(contact.body_b) - spin_driven(contact.body_a);
   }
 
  private:
-  bool is_of_patch(std::uint32_t first, std::uint32_t contact) const;
-  ContactPatch patch_of(std::span<const std::uint32_t> contacts) const;
-  double separation_of(const ContactPoint& contact, const ContactPatch& patch,
-                       const ContactMeeting& meeting) const;
-  static double depth_at_start(const ContactPoint& contact, const ContactMeeting& meeting) {
+  TANDEM_HD bool is_of_patch(std::uint32_t first, std::uint32_t contact) const;
+  TANDEM_HD ContactPatch patch_of(std::span<const std::uint32_t> contacts) const;
+  TANDEM_HD double separation_of(const ContactPoint& contact, const ContactPatch& patch,
+                                 const ContactMeeting& meeting) const;
+  TANDEM_HD static double depth_at_start(const ContactPoint& contact, const ContactMeeting& meeting) {
     return contact.depth + contact.time * dot(contact.normal, meeting.velocity);
   }
-  double rebound_of(const ContactPoint& contact, const ContactMeeting& meeting,
-                    const Material& material) const;
-  Vector3 velocity_at(std::uint32_t body, const Vector3& arm) const;
-  Vector3 pull_at(std::uint32_t body, const Vector3& arm) const;
-  Vector3 driven(std::uint32_t body, const Vector3& arm) const;
-  Vector3 spin_driven(std::uint32_t body) const;
+  TANDEM_HD double rebound_of(const ContactPoint& contact, const ContactMeeting& meeting,
+                              const Material& material) const;
+  TANDEM_HD Vector3 velocity_at(std::uint32_t body, const Vector3& arm) const;
+  TANDEM_HD Vector3 pull_at(std::uint32_t body, const Vector3& arm) const;
+  TANDEM_HD Vector3 driven(std::uint32_t body, const Vector3& arm) const;
+  TANDEM_HD Vector3 spin_driven(std::uint32_t body) const;
 
-  const StepInput& input_;
-  std::span<const BodyState> states_;
-  const SolverOptions& options_;
+  StepNumbers step_;
 };
+
+namespace contact_rows_detail {
+
+TANDEM_HD inline Vector6 scaled(const MassScale& scale, const Vector3& velocity, const Vector3& spin) {
+  return {scale.root_mass * velocity, inverse(scale.spread) * spin};
+}
+
+TANDEM_HD inline Vector6 gradient(const SteppedBody& body, const Vector3& direction, const Vector3& arm) {
+  if (!body.moves) return {};
+  return {body.scale.inverse_root_mass * direction, transposed(body.scale.spread) * cross(arm, direction)};
+}
+
+}  // namespace contact_rows_detail
+
+TANDEM_HD inline SteppedBody RowMaker::body(std::uint32_t body) const {
+  const BodyState& state = step_.states[body];
+  SteppedBody out;
+  out.moves = true;
+  const double root_mass = std::sqrt(step_.bodies[body].mass);
+  out.scale = {root_mass, 1 / root_mass,
+               matrix_of(state.orientation) * cholesky(step_.bodies[body].inverse_inertia)};
+  out.velocity = contact_rows_detail::scaled(out.scale, state.velocity, state.angular_velocity);
+  out.gravity = contact_rows_detail::scaled(out.scale, step_.pulls[body].linear, step_.pulls[body].angular);
+  return out;
+}
+
+// The contacts of a patch are those of a pair that have the same normal.
+TANDEM_HD inline bool RowMaker::is_of_patch(std::uint32_t first, std::uint32_t contact) const {
+  return square(step_.contacts[contact].normal - step_.contacts[first].normal) < 1e-12;
+}
+
+TANDEM_HD inline ContactPatch RowMaker::patch_of(std::span<const std::uint32_t> contacts) const {
+  ContactPatch out = {&step_.contacts[contacts[0]], {}};
+  for (const std::uint32_t i : contacts) {
+    const ContactPoint& contact = step_.contacts[i];
+    if (contact.depth > out.deepest->depth) out.deepest = &contact;
+  }
+  const double least = std::min(0.0, out.deepest->depth);
+  double shares = 0;
+  for (const std::uint32_t i : contacts) {
+    const ContactPoint& contact = step_.contacts[i];
+    if (contact.depth < least) continue;
+    const double share = step_.options.slop + std::max(0.0, contact.depth);
+    out.centre += share * contact.position, shares += share;
+  }
+  out.centre = out.centre / shares;
+  return out;
+}
+
+// A gap may close; what is in contact comes no deeper, or bodies would rock within the slop. But a body that
+// rolls brings the points before it down: they may go on as they turn, and faster. Bodies that turn slowly,
+// or have the contacts of the start, come to rest: there only points of a patch that is clearly round may, if
+// that is much.
+TANDEM_HD inline double RowMaker::separation_of(const ContactPoint& contact, const ContactPatch& patch,
+                                                const ContactMeeting& meeting) const {
+  constexpr double kFasterOfMiddle = 2, kRound = 0.7, kOfSlop = 0.25, kFaster = 4, kLeast = 0.3;
+  // What comes out by itself is not pushed out.
+  const double depth = std::min(contact.depth, depth_at_start(contact, meeting));
+  const double separation = depth < 0 ? -depth : std::min(0.0, step_.options.slop - depth);
+  const Vector3 spin_a = step_.states[contact.body_a].angular_velocity,
+                spin_b = step_.states[contact.body_b].angular_velocity;
+  const auto comes_down = [&](const Vector3& than) {
+    return -step_.dt * dot(contact.normal, cross(spin_b - spin_a, contact.position - than));
+  };
+  const double turning = step_.dt * (step_.bodies[contact.body_a].radius * norm(spin_a) +
+                                     step_.bodies[contact.body_b].radius * norm(spin_b));
+  if (contact.time > 0 && turning > kFastFrom * step_.options.slop)
+    return separation + std::max(0.0, kFasterOfMiddle * comes_down(patch.centre));
+  const ContactPoint& deepest = *patch.deepest;
+  if (deepest.depth - contact.depth < kRound * std::max(deepest.depth, kOfSlop * step_.options.slop))
+    return separation;
+  const double allowed = kFaster * comes_down(deepest.position);
+  return allowed > kLeast * step_.options.slop ? separation + allowed : separation;
+}
+
+// The velocity of a body's point if contacts do not move the body, else 0.
+TANDEM_HD inline Vector3 RowMaker::driven(std::uint32_t body, const Vector3& arm) const {
+  if (step_.bodies[body].motion != Motion::kinematic) return Vector3{};
+  return step_.states[body].velocity + cross(step_.states[body].angular_velocity, arm);
+}
+
+TANDEM_HD inline Vector3 RowMaker::spin_driven(std::uint32_t body) const {
+  if (step_.bodies[body].motion != Motion::kinematic) return Vector3{};
+  return step_.states[body].angular_velocity;
+}
+
+// The velocity of a body's point.
+TANDEM_HD inline Vector3 RowMaker::velocity_at(std::uint32_t body, const Vector3& arm) const {
+  if (step_.bodies[body].motion == Motion::fixed) return Vector3{};
+  return step_.states[body].velocity + cross(step_.states[body].angular_velocity, arm);
+}
+
+// Returns how gravity and lasting forces accelerate the place of a contact.
+TANDEM_HD inline Vector3 RowMaker::pull_at(std::uint32_t body, const Vector3& arm) const {
+  if (!is_moved(body)) return Vector3{};
+  return step_.pulls[body].linear + cross(step_.pulls[body].angular, arm);
+}
+
+TANDEM_HD inline double RowMaker::rebound_of(const ContactPoint& contact, const ContactMeeting& meeting,
+                                             const Material& material) const {
+  constexpr double kBouncesAbove = 2;  // times what gravity and forces give in a step
+  if (!(material.restitution > 0)) return 0;
+  const double approach = -dot(contact.normal, meeting.velocity);
+  const double fall =
+      -dot(contact.normal, pull_at(contact.body_b, meeting.arm_b) - pull_at(contact.body_a, meeting.arm_a));
+  const double gap = std::max(0.0, -depth_at_start(contact, meeting));
+  const bool meets = gap < step_.dt * (approach + 0.5 * step_.dt * fall) || gap == 0;
+  if (!meets || !(approach > kBouncesAbove * step_.dt * step_.pull_of(contact))) return 0;
+  const double square_at_impact = approach * approach + 2 * fall * gap;
+  return material.restitution * std::sqrt(std::max(0.0, square_at_impact));
+}
+
+TANDEM_HD inline ContactMeeting RowMaker::meeting(const ContactPoint& contact, const ContactPatch& patch,
+                                                  const Material& material) const {
+  ContactMeeting out;
+  out.arm_a = arm_of(contact, step_.states[contact.body_a]);
+  out.arm_b = arm_of(contact, step_.states[contact.body_b]);
+  out.velocity = velocity_at(contact.body_b, out.arm_b) - velocity_at(contact.body_a, out.arm_a);
+  out.separation = separation_of(contact, patch, out);
+  out.rebound = rebound_of(contact, out, material);
+  return out;
+}
+
+TANDEM_HD inline ContactRows RowMaker::rows(const ContactPoint& contact, const ContactPatch& patch,
+                                            const SteppedBody& a, const SteppedBody& b,
+                                            const Material& material, const ContactImpulse& impulse) const {
+  const Tangents across(contact.normal);
+  const ContactMeeting meets = meeting(contact, patch, material);
+  const auto row = [&](const Vector3& direction) {
+    return ContactRow{-contact_rows_detail::gradient(a, direction, meets.arm_a),
+                      contact_rows_detail::gradient(b, direction, meets.arm_b)};
+  };
+  const auto along = [&](const Vector3& x) {
+    return Vector3{dot(contact.normal, x), dot(across.first, x), dot(across.second, x)};
+  };
+  const Vector3 moving = driven(contact.body_b, meets.arm_b) - driven(contact.body_a, meets.arm_a);
+  const Vector3 pushed = along(impulse.tangential);
+  return {row(contact.normal), row(across.first),
+          row(across.second),  across.first,
+          across.second,       along(moving),
+          meets.separation,    material.friction,
+          meets.rebound,       {impulse.normal, pushed.y, pushed.z}};
+}
 
 /// Returns by how much an impulse of 1 about any axis changes how the bodies turn against each other, at
 /// most.
-double turning_mobility(const SteppedBody& a, const SteppedBody& b);
+TANDEM_HD inline double turning_mobility(const SteppedBody& a, const SteppedBody& b) {
+  Matrix3 mobility;
+  for (const SteppedBody* body : {&a, &b}) {
+    if (body->moves) mobility = mobility + body->scale.spread * transposed(body->scale.spread);
+  }
+  double most = 0;
+  for (const Vector3& row : mobility.row)
+    most = std::max(most, std::fabs(row.x) + std::fabs(row.y) + std::fabs(row.z));
+  return most;
+}
 
 /// Moves a body by a displacement and gives it a velocity, both as y.
-void apply_motion(const BodyProperties& body, const MassScale& scale, const Vector6& velocity,
-                  const Vector6& displacement, double dt, BodyState& state);
+TANDEM_HD inline void apply_motion(const BodyProperties& body, const MassScale& scale,
+                                   const Vector6& velocity, const Vector6& displacement, double dt,
+                                   BodyState& state) {
+  state.velocity = velocity.linear / scale.root_mass;
+  state.angular_velocity = scale.spread * velocity.angular;
+  const Vector3 moved = displacement.linear / (scale.root_mass * dt);
+  const Vector3 turned = scale.spread * displacement.angular / dt;
+  advance(body, state, moved - state.velocity, turned - state.angular_velocity, dt);
+}
 
 }  // namespace tandem::dynamics

@@ -12,7 +12,7 @@ namespace {
 class ProblemMaker {
  public:
   ProblemMaker(const StepInput& input, const StepStart& start, const SolverOptions& options)
-      : input_(input), impulses_(start.impulses), rows_(input, start.states, options) {
+      : input_(input), impulses_(start.impulses), rows_({input, start.states, options}) {
     problem_.states = start.states;
   }
 

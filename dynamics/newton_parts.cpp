@@ -54,8 +54,8 @@ class Parts {
                                std::span<std::uint32_t> place, std::span<const std::uint32_t> order,
                                JointRule rule, std::span<ContactImpulse> impulses, bool* turned_far) {
     const double dt = input_.dt / count_;
-    StepInput part = {input_.bodies, contacts_,     one_,           dt,
-                      input_.pulls,  input_.number, input_.is_cold, input_.threads};
+    StepInput part = {
+        {input_.bodies, contacts_, dt, input_.pulls}, one_, input_.number, input_.is_cold, input_.threads};
     part.joints = input_.joints, part.joint_memory = input_.joint_memory;
     IslandProblem problem = make_island_problem(part, 0, {states_, impulses}, options, layers, place, order);
     const std::optional<Residual> residual = solve_newton_step(problem, part, options, rule, turned_far);

@@ -144,8 +144,14 @@ std::vector<ContactImpulse> Simulation::solve_contacts() {
   std::vector<ContactImpulse> impulses(contacts.size());
   if (options_.solver.warm_start) impulses = cache_.impulses();
   done_.assign(contacts.size(), {});
-  parts_.solver->step({acting_, contacts, islands_, options_.dt, pulls_, step_, cache_.is_cold(), threads_,
-                       joints_, joint_memory_, done_},
+  parts_.solver->step({{acting_, contacts, options_.dt, pulls_},
+                       islands_,
+                       step_,
+                       cache_.is_cold(),
+                       threads_,
+                       joints_,
+                       joint_memory_,
+                       done_},
                       states_, impulses);
   return impulses;
 }

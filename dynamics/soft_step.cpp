@@ -83,7 +83,7 @@ Residual SoftSolver::solve(const StepInput& input, std::span<const std::uint32_t
                            const SolverOptions& options, std::span<BodyState> states,
                            std::span<ContactImpulse> impulses) {
   if (islands.empty()) return {};
-  const Step step = {input, options, RowMaker(input, states, options), states, impulses};
+  const Step step = {input, options, RowMaker({input, states, options}), states, impulses};
   gather(step, islands);
   find_unit(step);
   make_groups(step);

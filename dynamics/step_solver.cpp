@@ -169,18 +169,6 @@ class IslandSolver final : public StepSolver {
 
 }  // namespace
 
-Material mixed_material(const BodyProperties& a, const BodyProperties& b, const SolverOptions& options) {
-  const auto said = [](double number, double otherwise) { return number >= 0 ? number : otherwise; };
-  const auto larger = [&](double Material::*number, double otherwise) {
-    return std::max(said(a.material.*number, otherwise), said(b.material.*number, otherwise));
-  };
-  const double friction_a = said(a.material.friction, options.friction),
-               friction_b = said(b.material.friction, options.friction);
-  return {friction_a == friction_b ? friction_a : std::sqrt(friction_a * friction_b),
-          larger(&Material::restitution, options.restitution),
-          larger(&Material::rolling_resistance, options.rolling_resistance)};
-}
-
 void StepSolver::sum_up(const Islands& islands, const Residual& residual) {
   statistics_ = {};
   for (std::size_t i = 0; i < islands.size(); ++i) statistics_.islands += islands.flies(i) ? 0 : 1;

@@ -1,5 +1,6 @@
 #pragma once
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -32,32 +33,47 @@ struct SolverOptions {
 };
 
 /// Returns the numbers of two bodies that touch, none of them less than 0.
-Material mixed_material(const BodyProperties& a, const BodyProperties& b, const SolverOptions& options);
+TANDEM_HD inline Material mixed_material(const BodyProperties& a, const BodyProperties& b,
+                                         const SolverOptions& options) {
+  const auto said = [](double number, double otherwise) { return number >= 0 ? number : otherwise; };
+  const auto larger = [&](double Material::*number, double otherwise) {
+    return std::max(said(a.material.*number, otherwise), said(b.material.*number, otherwise));
+  };
+  const double friction_a = said(a.material.friction, options.friction),
+               friction_b = said(b.material.friction, options.friction);
+  return {friction_a == friction_b ? friction_a : std::sqrt(friction_a * friction_b),
+          larger(&Material::restitution, options.restitution),
+          larger(&Material::rolling_resistance, options.rolling_resistance)};
+}
 
-/// The data of which a solver makes a step.
-struct StepInput {
+/// Bodies and contacts of a step.
+struct StepBodies {
   std::span<const BodyProperties> bodies;
   std::span<const ContactPoint> contacts;
-  const Islands& islands;  ///< of these contacts and joints
   double dt;
   std::span<const Pull> pulls;  ///< of each body
-  std::uint64_t number;         ///< of the step
-  bool is_cold;                 ///< there are no impulses of a step before
+
+  /// Returns what is added to the velocity of any point of a body in a second, at most; 0 of a body that
+  /// contacts do not move.
+  TANDEM_HD double pull_of(std::uint32_t body) const {
+    return bodies[body].motion == Motion::moving ? pulls[body].most() : 0;
+  }
+  TANDEM_HD double pull_of(const ContactPoint& contact) const {
+    return std::max(pull_of(contact.body_a), pull_of(contact.body_b));
+  }
+};
+
+/// The data of which a solver makes a step.
+struct StepInput : StepBodies {
+  const Islands& islands;  ///< of these contacts and joints
+  std::uint64_t number;    ///< of the step
+  bool is_cold;            ///< there are no impulses of a step before
   Threads& threads;
   std::span<const Joint> joints = {};
   std::span<JointMemory> joint_memory = {};  ///< impulses of the step before, and then of this one
   /// A result: what each contact did in the step, which in soft steps is not what the next step starts with;
   /// empty: nobody asks.
   std::span<ContactImpulse> done = {};
-
-  /// Returns what is added to the velocity of any point of a body in a second, at most; 0 of a body that
-  /// contacts do not move.
-  double pull_of(std::uint32_t body) const {
-    return bodies[body].motion == Motion::moving ? pulls[body].most() : 0;
-  }
-  double pull_of(const ContactPoint& contact) const {
-    return std::max(pull_of(contact.body_a), pull_of(contact.body_b));
-  }
 };
 
 /// Says what a solution leaves undone: the natural map of the complementarity problem, row by row the

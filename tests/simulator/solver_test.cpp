@@ -122,7 +122,7 @@ struct OneStep {
   }
   StepInput input() {
     pulls.assign(bodies.size(), {gravity, {}});
-    return {bodies, contacts, islands, kDt, pulls, 0, true, one_thread()};
+    return {{bodies, contacts, kDt, pulls}, islands, 0, true, one_thread()};
   }
   // Makes the step. Result: what each contact did.
   std::vector<ContactImpulse> solve(SolverKind kind) {

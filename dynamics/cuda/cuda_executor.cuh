@@ -1,0 +1,129 @@
+#pragma once
+#include <thrust/iterator/counting_iterator.h>
+#include <thrust/iterator/transform_iterator.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <cub/device/device_radix_sort.cuh>
+#include <cub/device/device_scan.cuh>
+
+#include "kernels/common/cub_code.cuh"
+#include "tandem/formats/gpu_memory.h"
+#include "tandem/formats/gpu_status.h"
+
+namespace tandem::dynamics {
+
+template <typename Visit>
+__global__ void __launch_bounds__(128) visit_each(const __grid_constant__ Visit visit,
+                                                  const std::uint32_t* count, std::uint32_t most) {
+  const std::uint32_t below = count != nullptr && *count < most ? *count : most;
+  for (std::uint32_t i = blockIdx.x * blockDim.x + threadIdx.x; i < below; i += gridDim.x * blockDim.x)
+    visit(i);
+}
+
+/// Returns the values of an array, and 0 behind the last of them.
+struct ValueOrZero {
+  const std::uint32_t *values, *count;
+  std::uint32_t most;
+  __host__ __device__ std::uint32_t operator()(std::uint32_t i) const {
+    return i < most && (count == nullptr || i < *count) ? values[i] : 0;
+  }
+};
+
+/// Queues the parts of a parallel step on a stream of a GPU; see HostExecutor. It neither waits nor
+/// allocates, but for arrays and where the room for sums and sorting is made. After an error it does nothing
+/// more.
+class CudaExecutor {
+ public:
+  template <typename T>
+  class Array {
+   public:
+    Status reserve(std::uint64_t count) { return status_of(array_.grow(count)); }
+    T* data() const { return array_.data(); }
+    std::uint64_t room() const { return array_.room(); }
+
+   private:
+    GpuArray<T> array_;
+  };
+
+  explicit CudaExecutor(cudaStream_t stream = nullptr) : stream_(stream) {}
+
+  cudaStream_t stream() const { return stream_; }
+  void set_stream(cudaStream_t stream) { stream_ = stream; }
+
+  /// Makes room for sums and sorting of so many. Waits for the GPU where memory grows.
+  Status reserve(std::uint32_t most) {
+    if (most <= room_) return Status::kOk;
+    std::size_t of_sums = 0, of_sort = 0;
+    cudaError_t error = gpu::load_cub_code();
+    if (error == cudaSuccess) error = sum(nullptr, of_sums, nullptr, nullptr, most, nullptr);
+    cub::DoubleBuffer<std::uint32_t> keys(nullptr, nullptr), values(nullptr, nullptr);
+    if (error == cudaSuccess)
+      error = cub::DeviceRadixSort::SortPairs(nullptr, of_sort, keys, values, most, 0, 32, stream_);
+    if (error == cudaSuccess) error = scratch_.grow(std::max(of_sums, of_sort));
+    if (error == cudaSuccess) error = other_keys_.grow(most);
+    if (error == cudaSuccess) error = other_values_.grow(most);
+    if (error == cudaSuccess) room_ = most;
+    return status_of(error);
+  }
+
+  template <typename Visit>
+  void for_each(const std::uint32_t* count, std::uint32_t most, const Visit& visit) {
+    constexpr std::uint32_t kThreads = 128, kMostBlocks = 1 << 16;
+    if (most == 0 || error_ != cudaSuccess) return;
+    const std::uint32_t blocks = std::min((most - 1) / kThreads + 1, kMostBlocks);
+    visit_each<<<blocks, kThreads, 0, stream_>>>(visit, count, most);
+    take(cudaGetLastError());
+  }
+
+  template <typename Visit>
+  void once(const Visit& visit) {
+    for_each(nullptr, 1, [visit] __device__(std::uint32_t) { visit(); });
+  }
+
+  void sum_before(const std::uint32_t* values, const std::uint32_t* count, std::uint32_t most,
+                  std::uint32_t* sums) {
+    std::size_t bytes = scratch_.room();
+    if (error_ == cudaSuccess) take(sum(scratch_.data(), bytes, values, count, most, sums));
+  }
+
+  void sort_by_key(std::uint32_t* keys, std::uint32_t* values, const std::uint32_t* count, std::uint32_t most,
+                   int bits) {
+    if (most == 0) return;
+    for_each(nullptr, most, [=] __device__(std::uint32_t i) {
+      if (count != nullptr && i >= *count) keys[i] = 0xFFFFFFFFu;
+    });
+    if (error_ != cudaSuccess) return;
+    std::size_t bytes = scratch_.room();
+    cub::DoubleBuffer<std::uint32_t> of_keys(keys, other_keys_.data()),
+        of_values(values, other_values_.data());
+    take(cub::DeviceRadixSort::SortPairs(scratch_.data(), bytes, of_keys, of_values, most, 0, bits, stream_));
+    const auto copy_back = [&](const std::uint32_t* from, std::uint32_t* to) {
+      if (from != to) take(cudaMemcpyAsync(to, from, most * sizeof *to, cudaMemcpyDeviceToDevice, stream_));
+    };
+    copy_back(of_keys.Current(), keys), copy_back(of_values.Current(), values);
+  }
+
+  /// Keeps the first error of a call of CUDA.
+  void take(cudaError_t error) {
+    if (error_ == cudaSuccess) error_ = error;
+  }
+  Status status() const { return status_of(error_); }
+  void forget_error() { error_ = cudaSuccess; }
+
+ private:
+  cudaError_t sum(void* scratch, std::size_t& bytes, const std::uint32_t* values, const std::uint32_t* count,
+                  std::uint32_t most, std::uint32_t* sums) const {
+    const auto in = thrust::make_transform_iterator(thrust::counting_iterator<std::uint32_t>(0),
+                                                    ValueOrZero{values, count, most});
+    return cub::DeviceScan::ExclusiveSum(scratch, bytes, in, sums, most + 1, stream_);
+  }
+
+  cudaStream_t stream_;
+  cudaError_t error_ = cudaSuccess;
+  std::uint32_t room_ = 0;
+  GpuArray<char> scratch_;
+  GpuArray<std::uint32_t> other_keys_, other_values_;
+};
+
+}  // namespace tandem::dynamics

@@ -1,0 +1,74 @@
+#pragma once
+#include <atomic>
+#include <bit>
+#include <cstdint>
+
+#include "tandem/formats/platform.h"
+
+// What several visits of HostExecutor or CudaExecutor may do to the same number at once. The results do not
+// depend on who comes first.
+namespace tandem::dynamics {
+
+TANDEM_HD inline void atomic_least(std::uint64_t& of, std::uint64_t x) {
+#ifdef __CUDA_ARCH__
+  atomicMin(reinterpret_cast<unsigned long long*>(&of), static_cast<unsigned long long>(x));
+#else
+  std::atomic_ref<std::uint64_t> to(of);
+  for (std::uint64_t now = to.load(); x < now && !to.compare_exchange_weak(now, x);) {
+  }
+#endif
+}
+
+TANDEM_HD inline void atomic_most(std::uint64_t& of, std::uint64_t x) {
+#ifdef __CUDA_ARCH__
+  atomicMax(reinterpret_cast<unsigned long long*>(&of), static_cast<unsigned long long>(x));
+#else
+  std::atomic_ref<std::uint64_t> to(of);
+  for (std::uint64_t now = to.load(); x > now && !to.compare_exchange_weak(now, x);) {
+  }
+#endif
+}
+
+TANDEM_HD inline void atomic_most(std::uint32_t& of, std::uint32_t x) {
+#ifdef __CUDA_ARCH__
+  atomicMax(&of, x);
+#else
+  std::atomic_ref<std::uint32_t> to(of);
+  for (std::uint32_t now = to.load(); x > now && !to.compare_exchange_weak(now, x);) {
+  }
+#endif
+}
+
+/// Condition: both are not less than 0.
+TANDEM_HD inline void atomic_most(double& of, double x) {
+  // Such numbers are in the order of their bits.
+#ifdef __CUDA_ARCH__
+  atomicMax(reinterpret_cast<unsigned long long*>(&of),
+            static_cast<unsigned long long>(__double_as_longlong(x)));
+#else
+  std::atomic_ref<double> to(of);
+  for (double now = to.load(); x > now && !to.compare_exchange_weak(now, x);) {
+  }
+#endif
+}
+
+/// Returns what was there before.
+TANDEM_HD inline std::uint32_t atomic_add(std::uint32_t& of, std::uint32_t x) {
+#ifdef __CUDA_ARCH__
+  return atomicAdd(&of, x);
+#else
+  return std::atomic_ref<std::uint32_t>(of).fetch_add(x);
+#endif
+}
+
+/// Writes `x` where `from` is. Returns what was there before.
+TANDEM_HD inline std::uint32_t atomic_exchange_if(std::uint32_t& of, std::uint32_t from, std::uint32_t x) {
+#ifdef __CUDA_ARCH__
+  return atomicCAS(&of, from, x);
+#else
+  std::atomic_ref<std::uint32_t>(of).compare_exchange_strong(from, x);
+  return from;
+#endif
+}
+
+}  // namespace tandem::dynamics

@@ -1,0 +1,85 @@
+#pragma once
+#include <algorithm>
+#include <cstdint>
+#include <numeric>
+#include <vector>
+
+#include "dynamics/threads.h"
+#include "tandem/formats/status.h"
+
+namespace tandem::dynamics {
+
+/// Runs the parts of a parallel step on threads of the CPU. CudaExecutor has the same functions and queues
+/// them on a GPU: so what is written for an executor runs on both.
+///
+/// What functions are given lies in the executor's memory, counts too: those that the CPU does not know yet.
+/// `most`: how many there is room for; of a larger count no more are looked at.
+class HostExecutor {
+ public:
+  /// Memory that grows and forgets.
+  template <typename T>
+  class Array {
+   public:
+    Status reserve(std::uint64_t count) {
+      if (count > elements_.size()) elements_.clear(), elements_.resize(count);
+      return Status::kOk;
+    }
+    T* data() const { return const_cast<T*>(elements_.data()); }
+    std::uint64_t room() const { return elements_.size(); }
+
+   private:
+    std::vector<T> elements_;
+  };
+
+  explicit HostExecutor(Threads& threads) : threads_(threads) {}
+
+  /// Calls visit(i) for each i below the count, or below `most` where count is null, in no order and side by
+  /// side.
+  template <typename Visit>
+  void for_each(const std::uint32_t* count, std::uint32_t most, const Visit& visit) {
+    const std::uint32_t all = below(count, most);
+    threads_.for_parts(all, kAtOnce, [&](std::size_t i) { visit(static_cast<std::uint32_t>(i)); });
+  }
+
+  /// Calls visit().
+  template <typename Visit>
+  void once(const Visit& visit) {
+    visit();
+  }
+
+  /// sums[i] becomes the sum of all values before i, of i from 0 to the count, up to which there must be
+  /// room.
+  void sum_before(const std::uint32_t* values, const std::uint32_t* count, std::uint32_t most,
+                  std::uint32_t* sums) {
+    std::uint32_t sum = 0;
+    for (std::uint32_t i = 0; i <= most; ++i) {
+      sums[i] = sum;
+      if (i < below(count, most)) sum += values[i];
+    }
+  }
+
+  /// Sorts values by ascending key, of which `bits` low bits count; equal ones keep their order. Keys beyond
+  /// the count, up to `most`, are taken for the largest.
+  void sort_by_key(std::uint32_t* keys, std::uint32_t* values, const std::uint32_t* count, std::uint32_t most,
+                   int bits) {
+    static_cast<void>(bits);
+    std::vector<std::uint32_t> order(below(count, most));
+    std::iota(order.begin(), order.end(), 0u);
+    std::ranges::stable_sort(order, {}, [&](std::uint32_t i) { return keys[i]; });
+    const std::vector<std::uint32_t> old_keys(keys, keys + order.size()), old(values, values + order.size());
+    for (std::size_t i = 0; i < order.size(); ++i) keys[i] = old_keys[order[i]], values[i] = old[order[i]];
+  }
+
+  Status status() const { return Status::kOk; }
+
+ private:
+  static constexpr std::size_t kAtOnce = 64;
+
+  static std::uint32_t below(const std::uint32_t* count, std::uint32_t most) {
+    return count != nullptr ? std::min(*count, most) : most;
+  }
+
+  Threads& threads_;
+};
+
+}  // namespace tandem::dynamics

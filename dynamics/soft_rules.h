@@ -132,29 +132,29 @@ TANDEM_HD inline void fill_pair(const SoftNumbers& step, double unit_root, const
   Vector3 turning;
   for (std::size_t i = 0; i < contacts.size(); ++i) turning += step.impulses[contacts[i]].turning;
   put(turning / substeps, turns.impulse, lane);
-  step.rows.visit_contacts(contacts, [&](std::size_t i, const ContactPoint& contact,
-                                         const ContactPatch& patch) {
-    const ContactMeeting meets = step.rows.meeting(contact, patch, material);
-    const ContactImpulse& impulse = step.impulses[contacts[i]];
-    const Tangents across(contact.normal);
-    SoftNormal& normal = rows.normals[group.first + i];
-    put(contact.normal, normal.direction.along, lane);
-    put(meets.arm_a, normal.direction.turn_a, lane), put(meets.arm_b, normal.direction.turn_b, lane);
-    put(1.0, normal.mass, lane);
-    put(meets.separation, normal.followed, lane);
-    put(impulse.normal / substeps, normal.impulse, lane);
-    SoftGap& gap = rows.gaps[group.first + i];
-    const double less = opposed(step.contacts, contacts, contact.normal, meets.separation, step.slop);
-    put(meets.separation, gap.separation, lane), put(meets.rebound, gap.rebound, lane);
-    put(less, gap.opposed, lane);
-    if (meets.rebound > 0) atomic_most(group.bounces, 1u);
-    if (less > 0) atomic_most(group.is_opposed, 1u);
-    SoftFriction& friction = rows.frictions[group.first + i];
-    put(across.first, friction.first.along, lane), put(across.second, friction.second.along, lane);
-    put(meets.velocity, friction.first.turn_a, lane);
-    put(impulse.tangential / substeps, friction.second.turn_a, lane);
-    put(material.friction, friction.coefficient, lane);
-  });
+  step.rows.visit_contacts(
+      contacts, [&](std::size_t i, const ContactPoint& contact, const ContactPatch& patch) {
+        const ContactMeeting meets = step.rows.meeting(contact, patch, material);
+        const ContactImpulse& impulse = step.impulses[contacts[i]];
+        const Tangents across(contact.normal);
+        SoftNormal& normal = rows.normals[group.first + i];
+        put(contact.normal, normal.direction.along, lane);
+        put(meets.arm_a, normal.direction.turn_a, lane), put(meets.arm_b, normal.direction.turn_b, lane);
+        put(1.0, normal.mass, lane);
+        put(meets.separation, normal.followed, lane);
+        put(impulse.normal / substeps, normal.impulse, lane);
+        SoftGap& gap = rows.gaps[group.first + i];
+        const double less = opposed(step.contacts, contacts, contact.normal, meets.separation, step.slop);
+        put(meets.separation, gap.separation, lane), put(meets.rebound, gap.rebound, lane);
+        put(less, gap.opposed, lane);
+        if (meets.rebound > 0) atomic_most(group.bounces, 1u);
+        if (less > 0) atomic_most(group.is_opposed, 1u);
+        SoftFriction& friction = rows.frictions[group.first + i];
+        put(across.first, friction.first.along, lane), put(across.second, friction.second.along, lane);
+        put(meets.velocity, friction.first.turn_a, lane);
+        put(impulse.tangential / substeps, friction.second.turn_a, lane);
+        put(material.friction, friction.coefficient, lane);
+      });
 }
 
 /// What a body does between sweeps.
@@ -184,8 +184,7 @@ TANDEM_HD inline void work_on(BodyWork work, float h, float gain, float& start, 
 TANDEM_HD inline void work_on(BodyWork work, float h, const SoftMotion& gain, SoftMotion& start,
                               SoftMotion& velocity, SoftMotion& moved) {
   for (int k = 0; k < 3; ++k) {
-    soft_rules_detail::work_on(work, h, gain.centre[k], start.centre[k], velocity.centre[k],
-                               moved.centre[k]);
+    soft_rules_detail::work_on(work, h, gain.centre[k], start.centre[k], velocity.centre[k], moved.centre[k]);
     soft_rules_detail::work_on(work, h, gain.spin[k], start.spin[k], velocity.spin[k], moved.spin[k]);
   }
 }
@@ -222,8 +221,8 @@ TANDEM_HD inline void write_pair(const SoftNumbers& step, double unit_root, cons
     impulses[contact] = impulse(substeps, of(rows.normals[row].impulse), of(friction.first_impulse),
                                 of(friction.second_impulse));
     if (done != nullptr)
-      done[contact] = impulse(unit, of(friction.sum_of_normal), of(friction.sum_of_first),
-                              of(friction.sum_of_second));
+      done[contact] =
+          impulse(unit, of(friction.sum_of_normal), of(friction.sum_of_first), of(friction.sum_of_second));
   }
 }
 

@@ -45,9 +45,7 @@ struct ColouringView {
   std::uint32_t* own;   // those that have a colour of their own
 
   /// Returns a number by which pairs have their colours.
-  TANDEM_HD std::uint64_t rank(std::uint32_t pair) const {
-    return std::uint64_t{order[pair]} << 32 | pair;
-  }
+  TANDEM_HD std::uint64_t rank(std::uint32_t pair) const { return std::uint64_t{order[pair]} << 32 | pair; }
   TANDEM_HD bool has(std::uint32_t pair, std::uint32_t body) const {
     return pairs.pairs[pair].a == body || pairs.pairs[pair].b == body;
   }
@@ -140,7 +138,8 @@ TANDEM_HD inline bool colour(const ColouringView& view, std::uint32_t i) {
   }
   std::uint32_t found = ColouringView::kNone;
   for (std::uint32_t word = 0; word < kSharedColours / 32 && found == ColouringView::kNone; ++word) {
-    std::uint32_t &of_a = taken[0].half[word / 2].data[word % 2], &of_b = taken[1].half[word / 2].data[word % 2];
+    std::uint32_t &of_a = taken[0].half[word / 2].data[word % 2],
+                  &of_b = taken[1].half[word / 2].data[word % 2];
     const std::uint32_t free = ~(of_a | of_b), first = free & (0u - free);
     if (free != 0) found = 32 * word + lowest(free);
     of_a |= first, of_b |= first;
@@ -184,8 +183,9 @@ TANDEM_HD inline BodyTurn turn_in_sweep(const ColouringView& view, std::uint32_t
   using namespace pair_colouring_detail;
   const std::uint32_t body = view.pairs.pairs[i].body(side), colour = view.colour[i];
   const std::uint32_t shared = taken_below(view.taken[body], kSharedColours);
-  return {colour < kSharedColours ? taken_below(view.taken[body], colour) : shared + view.turn[2 * i + side].turn,
-          shared + view.own_of[body]};
+  return {
+      colour < kSharedColours ? taken_below(view.taken[body], colour) : shared + view.turn[2 * i + side].turn,
+      shared + view.own_of[body]};
 }
 
 /// Gives pairs the colours that find_colours() finds; see there. A pair has its colour when all that come
@@ -228,7 +228,8 @@ class PairColouring {
         }
       }
     });
-    executor.for_each(&view.numbers->own, pairs.most, [=] TANDEM_HD(std::uint32_t k) { number_own(view, k); });
+    executor.for_each(&view.numbers->own, pairs.most,
+                      [=] TANDEM_HD(std::uint32_t k) { number_own(view, k); });
   }
 
   /// The result of the last find().
@@ -238,17 +239,9 @@ class PairColouring {
   ColouringView view_of(const ContactPairs& pairs) const {
     std::uint32_t *const of_bodies = of_bodies_.data(), *const of_pairs = of_pairs_.data();
     const std::uint64_t bodies = bodies_, most = of_pairs_.room() / 5;
-    return {pairs,
-            numbers_.data(),
-            of_bodies,
-            of_bodies + 2 * bodies,
-            of_bodies + bodies,
-            taken_.data(),
-            of_pairs,
-            of_pairs + most,
-            turns_.data(),
-            of_pairs + 2 * most,
-            of_pairs + 4 * most};
+    return {
+        pairs,    numbers_.data(), of_bodies,     of_bodies + 2 * bodies, of_bodies + bodies, taken_.data(),
+        of_pairs, of_pairs + most, turns_.data(), of_pairs + 2 * most,    of_pairs + 4 * most};
   }
 
   template <typename T>

@@ -33,13 +33,13 @@ struct GroupsView {
   ColouringView colouring;
   SoftStepNeeds* needs;
   std::uint32_t room_of_groups, room_of_rows;
-  ColourPlaces* colours;     // of each that pairs may share
-  std::uint32_t* groups;     // how many there are; 0 where there is too little room
-  std::uint32_t* lanes;      // of these
-  std::uint32_t* shared;     // how many groups there are of colours that pairs may share
-  std::uint32_t* place;      // of each pair among those of its colour and class
+  ColourPlaces* colours;  // of each that pairs may share
+  std::uint32_t* groups;  // how many there are; 0 where there is too little room
+  std::uint32_t* lanes;   // of these
+  std::uint32_t* shared;  // how many groups there are of colours that pairs may share
+  std::uint32_t* place;   // of each pair among those of its colour and class
   std::uint32_t *pairs_of, *contacts_of, *first_row;  // of each group
-  std::uint32_t* pair_of;    // of each lane
+  std::uint32_t* pair_of;                             // of each lane
 
   TANDEM_HD std::uint32_t contacts(std::uint32_t pair) const { return colouring.pairs.pairs[pair].count; }
 };
@@ -151,10 +151,9 @@ class PairGroups {
   GroupsView view_of(const ColouringView& colouring) const {
     const std::uint64_t groups = room_of_groups_;
     std::uint32_t* const of_groups = of_groups_.data();
-    return {colouring,        needs_.data(),        room_of_groups_,    room_of_rows_,
-            colours_.data(),  numbers_.data(),      numbers_.data() + 1, numbers_.data() + 2,
-            place_.data(),    of_groups,            of_groups + groups, of_groups + 2 * groups,
-            pair_of_.data()};
+    return {colouring,          needs_.data(),          room_of_groups_,     room_of_rows_, colours_.data(),
+            numbers_.data(),    numbers_.data() + 1,    numbers_.data() + 2, place_.data(), of_groups,
+            of_groups + groups, of_groups + 2 * groups, pair_of_.data()};
   }
 
   template <typename T>

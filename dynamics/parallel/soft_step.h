@@ -26,9 +26,9 @@ struct SoftStepInput {
 
 /// What a step writes. Each array may be the one of the input that it follows from.
 struct SoftStepOutput {
-  BodyState* states;          ///< at the end
-  ContactImpulse* impulses;   ///< as a whole step would need them, to start the next one with
-  ContactImpulse* done;       ///< what each contact did; see StepInput. Null: nobody asks
+  BodyState* states;         ///< at the end
+  ContactImpulse* impulses;  ///< as a whole step would need them, to start the next one with
+  ContactImpulse* done;      ///< what each contact did; see StepInput. Null: nobody asks
 };
 
 /// Says for how much ParallelSoftStep has room.
@@ -219,9 +219,9 @@ class ParallelSoftStep {
     step.states = {input.states, input.body_count};
     step.dt = input.dt, step.options = options;
     const SoftNumbers numbers(step, input.start_impulses);
-    const SoftRows rows = {nullptr,          nullptr,      groups_.data(),    turnings_.data(),
-                           normals_.data(),  gaps_.data(), frictions_.data(),
-                           static_cast<float>(1 / numbers.h)};
+    const SoftRows rows = {
+        nullptr,         nullptr,      groups_.data(),    turnings_.data(),
+        normals_.data(), gaps_.data(), frictions_.data(), static_cast<float>(1 / numbers.h)};
     const GroupsView& groups = grouping_.view();
     return {numbers,
             {rows, turns_.data(), velocities_.data(), moved_.data(), gains_.data(), starts_.data(),

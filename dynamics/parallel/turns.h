@@ -41,10 +41,12 @@ TANDEM_HD inline TurnWord look_for_turn(const TurnWord& from, std::uint32_t turn
 /// Hands on the word with these data to whose turn is `turn`.
 TANDEM_HD inline void give_turn(TurnWord& to, std::uint32_t turn, const std::uint32_t (&data)[3]) {
 #ifdef __CUDA_ARCH__
-  const std::uint64_t low = data[0] | std::uint64_t{data[1]} << 32, high = data[2] | std::uint64_t{turn} << 32;
-  asm volatile("{ .reg .b128 word; mov.b128 word, {%0, %1}; st.relaxed.gpu.global.b128 [%2], word; }" ::"l"(low),
-               "l"(high), "l"(__cvta_generic_to_global(&to))
-               : "memory");
+  const std::uint64_t low = data[0] | std::uint64_t{data[1]} << 32,
+                      high = data[2] | std::uint64_t{turn} << 32;
+  asm volatile(
+      "{ .reg .b128 word; mov.b128 word, {%0, %1}; st.relaxed.gpu.global.b128 [%2], word; }" ::"l"(low),
+      "l"(high), "l"(__cvta_generic_to_global(&to))
+      : "memory");
 #else
   for (int i = 0; i < 3; ++i) to.data[i] = data[i];
   std::atomic_ref(to.turn).store(turn, std::memory_order_release);

@@ -28,13 +28,20 @@ TANDEM_INLINE L all_of(float x) {
 template <typename L>
 TANDEM_INLINE L taken(const SoftNumber& from, int lane) {
   L out;
-  std::memcpy(&out.v, from.of + lane, sizeof out.v);
+  // One number is no copy of bytes, which a GPU would make byte by byte.
+  if constexpr (L::kLanes == 1)
+    out.v = from.of[lane];
+  else
+    std::memcpy(&out.v, from.of + lane, sizeof out.v);
   return out;
 }
 
 template <typename L>
 TANDEM_INLINE void put(const L& x, SoftNumber& to, int lane) {
-  std::memcpy(to.of + lane, &x.v, sizeof x.v);
+  if constexpr (L::kLanes == 1)
+    to.of[lane] = x.v;
+  else
+    std::memcpy(to.of + lane, &x.v, sizeof x.v);
 }
 
 template <typename L>
@@ -82,23 +89,27 @@ struct MotionOf {
 template <typename L>
 class PairVisit {
  public:
-  /// a, b: how the bodies move.
-  TANDEM_INLINE PairVisit(const SoftRows& rows, std::uint32_t group, int lane, const MotionOf<L>& a,
-                          const MotionOf<L>& b)
+  TANDEM_INLINE PairVisit(const SoftRows& rows, std::uint32_t group, int lane)
       : rows_(rows),
         pairs_(rows.pairs[group]),
         turning_(rows.turnings[group]),
         lane_(lane),
-        a_(a),
-        b_(b),
+        first_(pairs_.first),
+        contacts_(pairs_.contacts),
+        bounces_(pairs_.bounces != 0),
+        is_opposed_(pairs_.is_opposed != 0),
         inverse_mass_a_(taken<L>(pairs_.inverse_mass_a, lane)),
         inverse_mass_b_(taken<L>(pairs_.inverse_mass_b, lane)) {}
 
+  /// Begins the visit with how the bodies move.
+  TANDEM_INLINE void begin(const MotionOf<L>& a, const MotionOf<L>& b) {
+    a_ = a, b_ = b;
+  }
   TANDEM_INLINE const MotionOf<L>& a() const { return a_; }
   TANDEM_INLINE const MotionOf<L>& b() const { return b_; }
 
   TANDEM_INLINE void start() {
-    for (std::uint32_t i = 0; i < pairs_.contacts; ++i) {
+    for (std::uint32_t i = 0; i < contacts_; ++i) {
       SoftFriction& row = friction(i);
       make_rows(normal(i), row);
       push(direction(normal(i).direction), take(normal(i).impulse));
@@ -113,10 +124,10 @@ class PairVisit {
     const L fastest = all_of<L>(-kFastestPush);
     const L bias_rate = take(pairs_.bias_rate), mass_scale = take(pairs_.mass_scale),
             impulse_scale = take(pairs_.impulse_scale);
-    for (std::uint32_t i = 0; i < pairs_.contacts; ++i) {
+    for (std::uint32_t i = 0; i < contacts_; ++i) {
       SoftNormal& row = normal(i);
       const L followed = take(row.followed);
-      const L deep = smaller(none, pairs_.is_opposed != 0 ? followed + take(gap(i).opposed) : followed);
+      const L deep = smaller(none, is_opposed_ ? followed + take(gap(i).opposed) : followed);
       const auto is_gap = less(none, followed);
       const L bias = select(is_gap, followed * inverse_h, larger(bias_rate * deep, fastest));
       visit(i, bias, select(is_gap, one, mass_scale), select(is_gap, none, impulse_scale));
@@ -125,7 +136,7 @@ class PairVisit {
 
   // a, b: how far the bodies have moved at this time.
   TANDEM_INLINE void follow(float time, const MotionOf<L>& a, const MotionOf<L>& b) {
-    for (std::uint32_t i = 0; i < pairs_.contacts; ++i) {
+    for (std::uint32_t i = 0; i < contacts_; ++i) {
       SoftNormal& row = normal(i);
       const Direction along = direction(row.direction);
       put(take(gap(i).separation) + speed(along, a, b) + time * take(row.drive), row.followed, lane_);
@@ -134,7 +145,7 @@ class PairVisit {
 
   TANDEM_INLINE void relax() {
     const L none{}, one = all_of<L>(1), inverse_h = all_of<L>(rows_.inverse_h);
-    for (std::uint32_t i = 0; i < pairs_.contacts; ++i)
+    for (std::uint32_t i = 0; i < contacts_; ++i)
       visit(i, larger(none, take(normal(i).followed) * inverse_h), one, none);
   }
 
@@ -142,7 +153,7 @@ class PairVisit {
   TANDEM_INLINE void rub() {
     const L none{};
     L all{};
-    for (std::uint32_t i = 0; i < pairs_.contacts; ++i) {
+    for (std::uint32_t i = 0; i < contacts_; ++i) {
       SoftFriction& row = friction(i);
       const L push = take(normal(i).impulse);
       all = all + push;
@@ -155,7 +166,7 @@ class PairVisit {
 
   TANDEM_INLINE void rebound() {
     const L none{}, one = all_of<L>(1);
-    for (std::uint32_t i = 0; i < pairs_.contacts; ++i) {
+    for (std::uint32_t i = 0; i < contacts_; ++i) {
       SoftNormal& row = normal(i);
       const L wanted = take(gap(i).rebound);
       const L old = take(row.impulse);
@@ -179,7 +190,7 @@ class PairVisit {
       largest = larger(largest, size);
       squares = squares + size * size;
     };
-    for (std::uint32_t i = 0; i < pairs_.contacts; ++i) {
+    for (std::uint32_t i = 0; i < contacts_; ++i) {
       const SoftNormal& row = normal(i);
       const L old = take(row.impulse), rebound = take(gap(i).rebound);
       const auto bounces = less(none, smaller(rebound, take(gap(i).strongest)));
@@ -242,11 +253,11 @@ class PairVisit {
     return {taken<L>(from.along, lane_), taken<L>(from.turn_a, lane_), taken<L>(from.turn_b, lane_)};
   }
   TANDEM_INLINE SoftNormal& normal(std::uint32_t contact) const {
-    return rows_.normals[pairs_.first + contact];
+    return rows_.normals[first_ + contact];
   }
-  TANDEM_INLINE SoftGap& gap(std::uint32_t contact) const { return rows_.gaps[pairs_.first + contact]; }
+  TANDEM_INLINE SoftGap& gap(std::uint32_t contact) const { return rows_.gaps[first_ + contact]; }
   TANDEM_INLINE SoftFriction& friction(std::uint32_t contact) const {
-    return rows_.frictions[pairs_.first + contact];
+    return rows_.frictions[first_ + contact];
   }
 
   TANDEM_INLINE static L speed(const Direction& d, const MotionOf<L>& a, const MotionOf<L>& b) {
@@ -274,7 +285,7 @@ class PairVisit {
     const L next = next_impulse(row, along, impulse, bias, mass_scale, impulse_scale);
     push(along, next - impulse);
     put(next, row.impulse, lane_);
-    if (pairs_.bounces != 0) put(larger(take(gap(contact).strongest), next), gap(contact).strongest, lane_);
+    if (bounces_) put(larger(take(gap(contact).strongest), next), gap(contact).strongest, lane_);
   }
 
   TANDEM_INLINE void rub(SoftFriction& row, const L& push_of_normal) {
@@ -338,8 +349,10 @@ class PairVisit {
   SoftPairs& pairs_;
   SoftTurning& turning_;
   int lane_;
-  MotionOf<L> a_, b_;
+  std::uint32_t first_, contacts_;
+  bool bounces_, is_opposed_;
   L inverse_mass_a_, inverse_mass_b_;
+  MotionOf<L> a_, b_;
 };
 
 }  // namespace

@@ -179,9 +179,9 @@ TANDEM_HD inline void visit_lane(const SoftSweeps& all, std::uint32_t number, co
   if (static_cast<std::uint32_t>(lane) >= all.rows.pairs[group].pairs) return;
   const SoftTurns& turns = all.turns[group];
   const Side sides[2] = {side_of(turns, 0, lane, number), side_of(turns, 1, lane, number)};
+  PairVisit<OneLane> pair(all.rows, group, lane);
   const PairMotions motions = wait_for(all, sweep, sides);
-  PairVisit<OneLane> pair(all.rows, group, lane, lanes_of(motions.velocities[0]),
-                          lanes_of(motions.velocities[1]));
+  pair.begin(lanes_of(motions.velocities[0]), lanes_of(motions.velocities[1]));
   visit(all, sweep, pair, motions);
   if (sides[0].moves) hand_on(all, sweep, sides[0], motion_of(pair.a()));
   if (sides[1].moves) hand_on(all, sweep, sides[1], motion_of(pair.b()));

@@ -50,7 +50,9 @@ struct RandomHeap {
 
  private:
   std::uint32_t below(std::uint32_t most) { return static_cast<std::uint32_t>(random_() % most); }
-  double number(double low, double high) { return std::uniform_real_distribution<double>(low, high)(random_); }
+  double number(double low, double high) {
+    return std::uniform_real_distribution<double>(low, high)(random_);
+  }
   Vector3 any(double most) { return {number(-most, most), number(-most, most), number(-most, most)}; }
 
   void make_body(std::uint32_t i) {

@@ -102,9 +102,7 @@ class PairVisit {
         inverse_mass_b_(taken<L>(pairs_.inverse_mass_b, lane)) {}
 
   /// Begins the visit with how the bodies move.
-  TANDEM_INLINE void begin(const MotionOf<L>& a, const MotionOf<L>& b) {
-    a_ = a, b_ = b;
-  }
+  TANDEM_INLINE void begin(const MotionOf<L>& a, const MotionOf<L>& b) { a_ = a, b_ = b; }
   TANDEM_INLINE const MotionOf<L>& a() const { return a_; }
   TANDEM_INLINE const MotionOf<L>& b() const { return b_; }
 
@@ -252,9 +250,7 @@ class PairVisit {
   TANDEM_INLINE Direction direction(const SoftDirection& from) const {
     return {taken<L>(from.along, lane_), taken<L>(from.turn_a, lane_), taken<L>(from.turn_b, lane_)};
   }
-  TANDEM_INLINE SoftNormal& normal(std::uint32_t contact) const {
-    return rows_.normals[first_ + contact];
-  }
+  TANDEM_INLINE SoftNormal& normal(std::uint32_t contact) const { return rows_.normals[first_ + contact]; }
   TANDEM_INLINE SoftGap& gap(std::uint32_t contact) const { return rows_.gaps[first_ + contact]; }
   TANDEM_INLINE SoftFriction& friction(std::uint32_t contact) const {
     return rows_.frictions[first_ + contact];

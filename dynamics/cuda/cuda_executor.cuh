@@ -14,8 +14,8 @@
 namespace tandem::dynamics {
 
 template <typename Visit>
-__global__ void __launch_bounds__(128) visit_each(const __grid_constant__ Visit visit,
-                                                  const std::uint32_t* count, std::uint32_t most) {
+__global__ void __launch_bounds__(128)
+    visit_each(const __grid_constant__ Visit visit, const std::uint32_t* count, std::uint32_t most) {
   const std::uint32_t below = count != nullptr && *count < most ? *count : most;
   for (std::uint32_t i = blockIdx.x * blockDim.x + threadIdx.x; i < below; i += gridDim.x * blockDim.x)
     visit(i);

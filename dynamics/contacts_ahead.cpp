@@ -1,7 +1,6 @@
 #include "dynamics/contacts_ahead.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <iterator>
 
@@ -115,50 +114,30 @@ double ContactsAhead::farthest(const BodiesAhead& of) {
   return largest.farthest(of.overlap());
 }
 
-// Finds on which ways pairs may meet within the step, from their distances. They are asked about together
-// that have about the same reach, and farther than is needed now, so that most need not be asked about in the
-// next steps.
+// Finds on which ways pairs may meet within the step, from their distances. These are asked for farther than
+// is needed now, so that most need not be asked for in the next steps.
 void ContactsAhead::find_approaches(std::span<const ContactPoint> found, std::span<const ObjectPair> kept,
                                     const BodiesAhead& of) {
-  constexpr double kExact = 0.1;  // of the overlap
-  constexpr int kClasses = 24;
-  std::array<std::vector<std::uint32_t>, kClasses> of_reach;
+  pairs_.clear(), places_.clear(), reaches_.clear(), approaches_.clear();
   auto contact = found.begin();
   auto known = kept.begin();
   for (std::uint32_t i = 0; i < apart_.size(); ++i) {
     const Apart& apart = apart_[i];
-    while (contact != found.end() && ObjectPair{contact->body_a, contact->body_b} < apart.pair) ++contact;
-    if (contact != found.end() && ObjectPair{contact->body_a, contact->body_b} == apart.pair) continue;
+    while (contact != found.end() && pair_of(*contact) < apart.pair) ++contact;
+    if (contact != found.end() && pair_of(*contact) == apart.pair) continue;
     while (known != kept.end() && *known < apart.pair) ++known;
     if (known != kept.end() && *known == apart.pair) continue;
     if (apart.distance > apart.reach) continue;
-    const int exponent = std::max(std::ilogb(apart.reach / of.overlap()), 0);
-    of_reach[static_cast<std::size_t>(std::min(exponent, kClasses - 1))].push_back(i);
+    pairs_.push_back(apart.pair), places_.push_back(i), reaches_.push_back(asked_reach(apart.reach));
   }
-  struct Nearest {
-    std::uint32_t place;
-    ObjectDistance distance;
-  };
-  std::vector<Nearest> nearest;
-  for (const std::vector<std::uint32_t>& places : of_reach) {
-    if (places.empty()) continue;
-    pairs_.clear();
-    double reach = 0;
-    for (const std::uint32_t i : places)
-      pairs_.push_back(apart_[i].pair), reach = std::max(reach, apart_[i].reach);
-    const DistanceOptions options = {.tolerance = {kExact * of.overlap(), 0.1}, .reach = 1.5 * reach};
-    require(distances_.find(scene_, pairs_, options), scene_);
-    for (std::size_t i = 0; i < places.size(); ++i) {
-      const ObjectDistance& distance = distances_.rows()[i];
-      apart_[places[i]].distance = distance.lower;
-      nearest.push_back({places[i], distance});
-    }
-  }
-  std::ranges::sort(nearest, {}, &Nearest::place);
-  approaches_.clear();
-  for (const auto& [place, distance] : nearest) {
+  if (pairs_.empty()) return;
+  require(distances_.find(scene_, pairs_, {.tolerance = distance_tolerance(of), .reach_of_pair = reaches_}),
+          scene_);
+  for (std::size_t i = 0; i < places_.size(); ++i) {
+    const ObjectDistance& distance = distances_.rows()[i];
+    apart_[places_[i]].distance = distance.lower;
     Approach found_ways[2];
-    const int count = dynamics::find_approaches(of, apart_[place].pair, distance, found_ways);
+    const int count = dynamics::find_approaches(of, pairs_[i], distance, found_ways);
     approaches_.insert(approaches_.end(), found_ways, found_ways + count);
   }
 }

@@ -107,6 +107,8 @@ class ContactsAhead {
   std::vector<Motion> motion_;
   std::vector<Instance> instances_;
   std::vector<ObjectPair> pairs_, moved_pairs_, of_middle_, missed_;
+  std::vector<std::uint32_t> places_;  // of pairs_ in apart_
+  std::vector<double> reaches_;
   std::vector<Approach> approaches_;
   std::vector<ContactPoint> points_, in_middle_;
 };

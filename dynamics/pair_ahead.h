@@ -100,8 +100,7 @@ TANDEM_HD inline bool has_middle(const BodiesAhead& of, const ObjectPair& pair) 
 
 /// Returns where a body is in the middle of the step.
 TANDEM_HD inline Instance pose_in_middle(const BodiesAhead& of, std::uint32_t body) {
-  return pose_of(of.bodies[body],
-                 of.is_idle(body) ? of.states[body] : later(of.states[body], 0.5 * of.dt));
+  return pose_of(of.bodies[body], of.is_idle(body) ? of.states[body] : later(of.states[body], 0.5 * of.dt));
 }
 
 /// Makes contacts of the step of those that a pair has in its middle. Result: whether the pair goes on
@@ -123,6 +122,15 @@ TANDEM_HD inline bool take_middle(const BodiesAhead& of, const ObjectPair& pair,
   return lasts;
 }
 
+/// Returns how far apart a pair is asked for its distance: farther than it needs now, so that most pairs need
+/// not be asked again in the next steps.
+TANDEM_HD inline double asked_reach(double reach) {
+  return 1.5 * reach;
+}
+TANDEM_HD inline DistanceTolerance distance_tolerance(const BodiesAhead& of) {
+  return {0.1 * of.overlap(), 0.1};
+}
+
 /// A way on which a pair may meet.
 struct Approach {
   ObjectPair pair;
@@ -142,8 +150,7 @@ TANDEM_HD inline int find_approaches(const BodiesAhead& of, const ObjectPair& pa
   const double closing = dot(of.approach(pair), from_b) / gap + of.turning(pair);
   const double most = kFarthest * smaller_radius(of, pair);
   const double overlap = of.overlap();
-  if (gap >
-      std::min(most, of.dt * std::max(0.0, closing) + of.fall_along(pair, from_b / gap) + overlap))
+  if (gap > std::min(most, of.dt * std::max(0.0, closing) + of.fall_along(pair, from_b / gap) + overlap))
     return 0;
   to[0] = {pair, gap, true, ((gap + overlap) / gap) * from_b};
   // A bowl that falls into another meets it all around, and not only where it is nearest. What moves

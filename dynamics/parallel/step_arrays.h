@@ -84,6 +84,8 @@ struct StepArrays {
   std::uint32_t* list;       ///< pairs of a question, by place
   ObjectPair* asked;         ///< bodies of these
   double* reach;             ///< of distances
+  std::uint32_t *row_first, *row_end;  ///< of each row of a question: what was found
+  const ObjectPair* moved_pairs;  ///< of row r bodies 2 r and 2 r + 1
   std::uint32_t* moved_asset;  ///< two for each row of a question about moved bodies
   Pose* moved_pose;
   Approach* approaches;

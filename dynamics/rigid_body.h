@@ -86,8 +86,8 @@ TANDEM_HD inline bool is_usable(const BodyState& state) {
     return std::fabs(x.x) <= most && std::fabs(x.y) <= most && std::fabs(x.z) <= most;
   };
   return is_within(state.position, kLargestWorldCoordinate) &&
-         std::fabs(state.orientation.w) <= 1.7976931348623157e308 &&
-         is_within(state.velocity, kFastest) && is_within(state.angular_velocity, kFastest);
+         std::fabs(state.orientation.w) <= 1.7976931348623157e308 && is_within(state.velocity, kFastest) &&
+         is_within(state.angular_velocity, kFastest);
 }
 
 /// Returns whether a step can move a body of this mass, in kg: products of three of its moments of inertia

@@ -7,7 +7,8 @@
 
 /// What a parallel step does before and after contacts are solved: what Simulation does with ContactsAhead,
 /// MovedQuery and ContactCache, pair by pair. Executor: HostExecutor or CudaExecutor. Questions: what answers
-/// questions about bodies in the executor's memory; near(), manifolds() and distances() as they are called below.
+/// questions about bodies in the executor's memory; near(), manifolds() and distances() as they are called
+/// below.
 namespace tandem::dynamics {
 
 /// Pairs in the executor's memory.
@@ -96,8 +97,7 @@ TANDEM_HD inline void decide_pair(const StepArrays& a, std::uint32_t at) {
   PairRecord& record = a.records[at];
   PairPlan& plan = a.plans[at];
   const ObjectPair& pair = record.pair;
-  const bool is_remembered =
-      (touched(a, plan) || (plan.is_in_reach && plan.is_slow)) && !plan.is_of_middle;
+  const bool is_remembered = (touched(a, plan) || (plan.is_in_reach && plan.is_slow)) && !plan.is_of_middle;
   record.is_posed = is_remembered;
   if (is_remembered) {
     const PairRecord* const old = plan.before != kNoIndex ? &a.records_before[plan.before] : nullptr;
@@ -275,16 +275,15 @@ struct PairStep {
   void add_missed() {
     using namespace pair_step_detail;
     const StepArrays of = a;
-    to.for_each(&of.counts->surprised, a.most_pairs, [of] TANDEM_HD(std::uint32_t r) {
+    to.for_each(&of.counts->surprised, a.most_moved, [of] TANDEM_HD(std::uint32_t r) {
       const ObjectPair& pair = of.records[of.list[r]].pair;
       pose_moved(of, r, pair, pose_of(of.acting[pair.a], of.end[pair.a]).pose,
                  pose_of(of.acting[pair.b], of.end[pair.b]).pose);
     });
     ask_about_moved(&of.counts->surprised);
     to.once([of] TANDEM_HD() { of.counts->missed = 0; });
-    to.for_each(&of.counts->surprised, a.most_pairs, [of] TANDEM_HD(std::uint32_t r) {
-      join_missed(of, of.list[r], found_of(of, r));
-    });
+    to.for_each(&of.counts->surprised, a.most_moved,
+                [of] TANDEM_HD(std::uint32_t r) { join_missed(of, of.list[r], found_of(of, r)); });
     remember_contacts();
     list_touching();
   }
@@ -309,8 +308,7 @@ struct PairStep {
       *of.counts = {};
       of.counts->records_before = before, of.counts->bad_body = kNoIndex;
     });
-    to.for_each(nullptr, a.bodies,
-                [of] TANDEM_HD(std::uint32_t i) { pair_step_detail::place_body(of, i); });
+    to.for_each(nullptr, a.bodies, [of] TANDEM_HD(std::uint32_t i) { pair_step_detail::place_body(of, i); });
   }
 
   void join_near_and_remembered(std::uint32_t most_near) {
@@ -336,8 +334,7 @@ struct PairStep {
       if (of.flags[j] == 0) return;
       const ObjectPair pair = of.records_before[j].pair;
       const std::uint32_t at =
-          of.sums[j] +
-          first_not_before(pair, *of.near_count, [&](std::uint32_t k) { return of.near[k]; });
+          of.sums[j] + first_not_before(pair, *of.near_count, [&](std::uint32_t k) { return of.near[k]; });
       if (at < of.most_pairs) plan_pair(of, at, pair, false, j);
     });
   }
@@ -351,12 +348,13 @@ struct PairStep {
           return plan.is_fast && touched(of, plan) && has_middle(of.ahead(), of.records[i].pair);
         },
         &of.counts->middle);
-    to.for_each(&of.counts->middle, a.most_pairs, [of] TANDEM_HD(std::uint32_t r) {
+    to.for_each(&of.counts->middle, a.most_moved, [of] TANDEM_HD(std::uint32_t r) {
       const ObjectPair& pair = of.records[of.list[r]].pair;
-      pose_moved(of, r, pair, pose_in_middle(of.ahead(), pair.a).pose, pose_in_middle(of.ahead(), pair.b).pose);
+      pose_moved(of, r, pair, pose_in_middle(of.ahead(), pair.a).pose,
+                 pose_in_middle(of.ahead(), pair.b).pose);
     });
     ask_about_moved(&of.counts->middle);
-    to.for_each(&of.counts->middle, a.most_pairs, [of] TANDEM_HD(std::uint32_t r) {
+    to.for_each(&of.counts->middle, a.most_moved, [of] TANDEM_HD(std::uint32_t r) {
       PairPlan& plan = of.plans[of.list[r]];
       const std::span<ContactPoint> found = found_of(of, r);
       plan.is_of_middle = take_middle(of.ahead(), of.records[of.list[r]].pair, of.inner_radius, found);
@@ -371,9 +369,8 @@ struct PairStep {
     select([of] TANDEM_HD(std::uint32_t i) { return of.plans[i].is_asked; }, &of.counts->asked);
     list_asked(&of.counts->asked);
     take_points({a.asset, a.pose, a.bodies}, {a.asked, &of.counts->asked, a.most_pairs});
-    to.for_each(&of.counts->asked, a.most_pairs, [of] TANDEM_HD(std::uint32_t r) {
-      set_found(of, of.plans[of.list[r]], found_of(of, r));
-    });
+    to.for_each(&of.counts->asked, a.most_pairs,
+                [of] TANDEM_HD(std::uint32_t r) { set_found(of, of.plans[of.list[r]], found_of(of, r)); });
   }
 
   void ask_for_contacts_ahead() {
@@ -401,20 +398,18 @@ struct PairStep {
       plan.first_found = of.sums[r], plan.found = static_cast<std::uint32_t>(count);
       for (int k = 0; k < count; ++k) {
         const std::uint32_t row = of.sums[r] + static_cast<std::uint32_t>(k);
-        if (row >= of.most_pairs) continue;
+        if (row >= of.most_moved) continue;
         of.approaches[row] = ways[k];
         BodyState moved = of.start[pair.b];
         moved.position += ways[k].way;
         pose_moved(of, row, pair, of.pose[pair.a], pose_of(of.acting[pair.b], moved).pose);
       }
     });
-    to.once([of] TANDEM_HD() { 
-      of.counts->approaches = of.sums[least_of(of.counts->apart, of.most_pairs)];
-    });
+    to.once([of] TANDEM_HD() { of.counts->approaches = of.sums[least_of(of.counts->apart, of.most_pairs)]; });
     ask_about_moved(&of.counts->approaches);
     to.for_each(&of.counts->apart, a.most_pairs, [of] TANDEM_HD(std::uint32_t r) {
       PairPlan& plan = of.plans[of.list[r]];
-      const std::uint32_t ways = plan.first_found + plan.found <= of.most_pairs ? plan.found : 0;
+      const std::uint32_t ways = plan.first_found + plan.found <= of.most_moved ? plan.found : 0;
       take_ahead(of, plan.first_found, ways, plan);
     });
   }
@@ -428,9 +423,7 @@ struct PairStep {
       of.flags[i] = old + (plan.keeps || plan.is_idle ? 0 : plan.found);
     });
     to.sum_before(a.flags, &of.counts->pairs, a.most_pairs, a.sums);
-    to.once([of] TANDEM_HD() {
-      of.counts->remembered = of.sums[least_of(of.counts->pairs, of.most_pairs)];
-    });
+    to.once([of] TANDEM_HD() { of.counts->remembered = of.sums[least_of(of.counts->pairs, of.most_pairs)]; });
     to.for_each(&of.counts->pairs, a.most_pairs, [of] TANDEM_HD(std::uint32_t i) {
       if (of.counts->remembered <= of.most_remembered && of.counts->found <= of.most_found)
         remember_pair(of, i);
@@ -461,7 +454,7 @@ struct PairStep {
 
   /// Finds the contacts of the rows: row r of two moved bodies.
   void ask_about_moved(const std::uint32_t* rows) {
-    take_points({a.moved_asset, a.moved_pose, 2 * a.most_pairs}, {a.moved_pairs, rows, a.most_pairs});
+    take_points({a.moved_asset, a.moved_pose, 2 * a.most_moved}, {a.moved_pairs, rows, a.most_moved});
   }
 
   void take_points(const PosedList& bodies, const PairList& pairs) {

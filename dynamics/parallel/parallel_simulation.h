@@ -10,6 +10,15 @@
 
 namespace tandem::dynamics {
 
+namespace parallel_simulation_detail {
+
+struct CountsGoOn {
+  StepCounts* counts;
+  TANDEM_HD void operator()() const { counts->records_before = counts->pairs; }
+};
+
+}  // namespace parallel_simulation_detail
+
 /// What a parallel simulation is made of.
 struct ParallelBodies {
   std::span<const BodyProperties> properties;
@@ -49,8 +58,9 @@ class ParallelSimulation {
     bodies_ = static_cast<std::uint32_t>(bodies.properties.size());
     options_ = options;
     within_ = 0;
-    most_pairs_ = most_found_ = most_remembered_ = 0;
+    most_pairs_ = most_moved_ = most_found_ = most_remembered_ = 0;
     for (Status status : {reserve_bodies(bodies), reserve_pairs(std::max(1024u, 8 * bodies_)),
+                          reserve_moved(std::max(256u, bodies_ / 2)),
                           reserve_contacts(std::max(4096u, 32 * bodies_), std::max(4096u, 32 * bodies_))}) {
       if (status != Status::kOk) return status;
     }
@@ -95,7 +105,7 @@ class ParallelSimulation {
     a.plans = plans_.data(), a.flags = flags_.data(), a.sums = sums_.data(), a.list = list_.data();
     a.asked = asked_.data(), a.reach = reach_.data();
     a.row_first = row_first_.data(), a.row_end = row_end_.data();
-    a.moved_pairs = moved_pairs_.data(), a.moved_asset = moved_asset_.data();
+    a.most_moved = most_moved_, a.moved_pairs = moved_pairs_.data(), a.moved_asset = moved_asset_.data();
     a.moved_pose = moved_pose_.data();
     a.approaches = approaches_.data(), a.touching = touching_.data();
     a.most_found = most_found_, a.most_remembered = most_remembered_;
@@ -139,10 +149,14 @@ class ParallelSimulation {
     if (status == Status::kOk) status = solver_.make_room(grew);
     const double needed = read_.reach.farthest(0.5 * options_.solver.slop);
     if (needed > within_) within_ = 1.5 * needed, grew = true;
-    const std::uint32_t pairs = std::max(read_.pairs, read_.approaches);
-    if (status == Status::kOk && pairs > most_pairs_) {
+    if (status == Status::kOk && read_.pairs > most_pairs_) {
       grew = true;
-      status = reserve_pairs(pairs + pairs / 4);
+      status = reserve_pairs(read_.pairs + read_.pairs / 4);
+    }
+    const std::uint32_t moved = std::max({read_.middle, read_.approaches, read_.surprised});
+    if (status == Status::kOk && moved > most_moved_) {
+      grew = true;
+      status = reserve_moved(moved + moved / 2);
     }
     if (status == Status::kOk && (read_.found > most_found_ || read_.remembered > most_remembered_)) {
       grew = true;
@@ -157,15 +171,9 @@ class ParallelSimulation {
     std::swap(states_[0], states_[1]), std::swap(states_[1], states_[2]);
     std::swap(records_[0], records_[1]), std::swap(remembered_[0], remembered_[1]);
     within_ = 1.25 * read_.reach.farthest(0.5 * options_.solver.slop);
-    StepCounts* const counts = counts_.data();
-    to_.once(CountsGoOn{counts});
+    to_.once(parallel_simulation_detail::CountsGoOn{counts_.data()});
     return to_.status();
   }
-
-  struct CountsGoOn {
-    StepCounts* counts;
-    TANDEM_HD void operator()() const { counts->records_before = counts->pairs; }
-  };
 
   template <typename T>
   Status put(Array<T>& array, const T& value) {
@@ -187,11 +195,11 @@ class ParallelSimulation {
     for (const BodyProperties& body : bodies.properties) asset.push_back(body.shape);
     Status out = Status::kOk;
     for (Status status :
-         {put<BodyProperties>(properties_, bodies.properties), put<BodyProperties>(acting_, bodies.properties),
-          put<BodyState>(states_[0], bodies.states), put<BodyState>(states_[1], bodies.states),
-          put<BodyState>(states_[2], bodies.states), put<std::uint32_t>(asset_, asset),
-          put<double>(inner_radius_, bodies.inner_radii), put<AssetBox>(boxes_, bodies.boxes),
-          fill<std::uint8_t>(placed_, 0), fill<double>(quiet_, 0),
+         {put<BodyProperties>(properties_, bodies.properties),
+          put<BodyProperties>(acting_, bodies.properties), put<BodyState>(states_[0], bodies.states),
+          put<BodyState>(states_[1], bodies.states), put<BodyState>(states_[2], bodies.states),
+          put<std::uint32_t>(asset_, asset), put<double>(inner_radius_, bodies.inner_radii),
+          put<AssetBox>(boxes_, bodies.boxes), fill<std::uint8_t>(placed_, 0), fill<double>(quiet_, 0),
           fill<std::uint32_t>(group_, Sleep::kAwake), fill<std::uint8_t>(idle_, 0), pulls_.reserve(bodies_),
           pose_.reserve(bodies_), motion_.reserve(bodies_), ways_.reserve(bodies_),
           ways_ahead_.reserve(bodies_), label_.reserve(bodies_), marks_.reserve(bodies_)}) {
@@ -201,21 +209,32 @@ class ParallelSimulation {
   }
 
   Status reserve_pairs(std::uint32_t pairs) {
-    std::vector<ObjectPair> moved(pairs);
-    for (std::uint32_t r = 0; r < pairs; ++r) moved[r] = {2 * r, 2 * r + 1};
     const std::uint32_t kept = most_pairs_;
     Status out = Status::kOk;
     for (Status status :
          {records_[0].grow(pairs, kept), records_[1].grow(pairs, kept), plans_.reserve(pairs),
           flags_.reserve(pairs + 1), sums_.reserve(pairs + 1), list_.reserve(pairs), asked_.reserve(pairs),
-          reach_.reserve(pairs), row_first_.reserve(pairs), row_end_.reserve(pairs),
-          put<ObjectPair>(moved_pairs_, moved), moved_asset_.reserve(2 * pairs),
-          moved_pose_.reserve(2 * pairs), approaches_.reserve(pairs), touching_.reserve(pairs),
+          reach_.reserve(pairs), row_first_.reserve(pairs), row_end_.reserve(pairs), touching_.reserve(pairs),
           to_.reserve(pairs + 1), ask_.reserve(bodies_, pairs)}) {
       if (out == Status::kOk) out = status;
     }
     most_pairs_ = out == Status::kOk ? pairs : 0;
     return out == Status::kOk ? solver_.reserve(bodies_, most_pairs_, most_remembered_) : out;
+  }
+
+  Status reserve_moved(std::uint32_t rows) {
+    std::vector<ObjectPair> pairs(rows);
+    for (std::uint32_t r = 0; r < rows; ++r) pairs[r] = {2 * r, 2 * r + 1};
+    Status out = Status::kOk;
+    // Questions look at the poses of all bodies.
+    for (Status status :
+         {put<ObjectPair>(moved_pairs_, pairs),
+          put<std::uint32_t>(moved_asset_, std::vector<std::uint32_t>(2 * rows)),
+          put<Pose>(moved_pose_, std::vector<Pose>(2 * rows, kIdentityPose)), approaches_.reserve(rows)}) {
+      if (out == Status::kOk) out = status;
+    }
+    most_moved_ = out == Status::kOk ? rows : 0;
+    return out;
   }
 
   Status reserve_contacts(std::uint32_t found, std::uint32_t remembered) {
@@ -224,8 +243,9 @@ class ParallelSimulation {
     Status out = Status::kOk;
     for (Status status :
          {found_.reserve(found), remembered_[0].grow(remembered, kept), remembered_[1].grow(remembered, kept),
-          contacts_.grow(remembered, kept), place_.reserve(remembered), contact_marks_.reserve(2 * remembered),
-          impulses_before_.reserve(remembered), impulses_.reserve(remembered), done_.grow(remembered, kept)}) {
+          contacts_.grow(remembered, kept), place_.reserve(remembered),
+          contact_marks_.reserve(2 * remembered), impulses_before_.reserve(remembered),
+          impulses_.reserve(remembered), done_.grow(remembered, kept)}) {
       if (out == Status::kOk) out = status;
     }
     if (out != Status::kOk) return out;
@@ -237,7 +257,7 @@ class ParallelSimulation {
   Questions& ask_;
   Solver& solver_;
   ParallelOptions options_;
-  std::uint32_t bodies_ = 0, most_pairs_ = 0, most_found_ = 0, most_remembered_ = 0;
+  std::uint32_t bodies_ = 0, most_pairs_ = 0, most_moved_ = 0, most_found_ = 0, most_remembered_ = 0;
   double within_ = 0;  // how far apart near pairs are
   bool has_forces_ = false;
   StepCounts read_ = {};

@@ -86,8 +86,7 @@ void sleep_step(Executor& to, const StepArrays& a, const SleepOptions& options) 
     const TouchingPair& pair = of.touching[i];
     if (of.is_moved(pair.a) && of.is_moved(pair.b)) join(of.label, pair.a, pair.b);
   });
-  to.for_each(nullptr, a.bodies,
-              [of] TANDEM_HD(std::uint32_t i) { of.label[i] = first_of(of.label, i); });
+  to.for_each(nullptr, a.bodies, [of] TANDEM_HD(std::uint32_t i) { of.label[i] = first_of(of.label, i); });
   to.for_each(&of.counts->pairs, a.most_pairs, [of] TANDEM_HD(std::uint32_t i) {
     const PairRecord& record = of.records[i];
     if (record.contacts == 0) return;

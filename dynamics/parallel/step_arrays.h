@@ -20,21 +20,21 @@ struct PairRecord {
   bool is_posed;  ///< `posed` says where the bodies stood when their contacts were found
   double apart;   ///< by which the bodies are apart at least, where it is near
   Pose posed[2];
-  std::uint32_t first, count;  ///< of the remembered contacts
+  std::uint32_t first, count;             ///< of the remembered contacts
   std::uint32_t first_contact, contacts;  ///< of the contacts of the step
-  bool touches;  ///< in the last step, as Touches says
+  bool touches;                           ///< in the last step, as Touches says
 };
 
 /// What becomes of a pair in a step.
 struct PairPlan {
-  std::uint32_t before;      ///< its record of the step before, or kNoIndex
-  bool is_idle;              ///< both bodies are: it stays as it was
+  std::uint32_t before;                ///< its record of the step before, or kNoIndex
+  bool is_idle;                        ///< both bodies are: it stays as it was
   bool is_slow, is_in_reach, is_fast;  ///< see PairReach
-  bool is_of_middle;         ///< its contacts are those of the middle of the step
-  bool keeps;                ///< its contacts are those remembered
-  bool is_asked;             ///< for contacts where the bodies stand
-  double reach;              ///< see PairReach
-  std::uint32_t first_found, found;  ///< contacts
+  bool is_of_middle;                   ///< its contacts are those of the middle of the step
+  bool keeps;                          ///< its contacts are those remembered
+  bool is_asked;                       ///< for contacts where the bodies stand
+  double reach;                        ///< see PairReach
+  std::uint32_t first_found, found;    ///< contacts
 };
 
 /// A pair whose contacts push bodies.
@@ -59,14 +59,14 @@ struct StepArrays {
   BodyProperties* acting;            ///< what sleeps is fixed
   BodyState *before, *start, *end;   ///< at the start of the step before, of this one, and at its end
   Pull* pulls;
-  const BodyForce* forces;      ///< null: there are none
-  std::uint8_t* placed;         ///< fixed bodies that were placed since the last step
+  const BodyForce* forces;  ///< null: there are none
+  std::uint8_t* placed;     ///< fixed bodies that were placed since the last step
   std::uint8_t* idle;
   std::uint32_t* asset;
   Pose* pose;
-  Motion* motion;               ///< of the filter of pairs
-  BodyWay *ways, *ways_ahead;   ///< since the step before; in this one
-  double* quiet;                ///< see Sleep
+  Motion* motion;              ///< of the filter of pairs
+  BodyWay *ways, *ways_ahead;  ///< since the step before; in this one
+  double* quiet;               ///< see Sleep
   std::uint32_t *group, *label;
   std::uint32_t* marks;
 
@@ -81,12 +81,13 @@ struct StepArrays {
   PairRecord *records_before, *records;
   PairPlan* plans;
   std::uint32_t *flags, *sums;
-  std::uint32_t* list;       ///< pairs of a question, by place
-  ObjectPair* asked;         ///< bodies of these
-  double* reach;             ///< of distances
+  std::uint32_t* list;                 ///< pairs of a question, by place
+  ObjectPair* asked;                   ///< bodies of these
+  double* reach;                       ///< of distances
   std::uint32_t *row_first, *row_end;  ///< of each row of a question: what was found
-  const ObjectPair* moved_pairs;  ///< of row r bodies 2 r and 2 r + 1
-  std::uint32_t* moved_asset;  ///< two for each row of a question about moved bodies
+  std::uint32_t most_moved;            ///< rows of questions about moved bodies
+  const ObjectPair* moved_pairs;       ///< of row r bodies 2 r and 2 r + 1
+  std::uint32_t* moved_asset;          ///< two for each such row
   Pose* moved_pose;
   Approach* approaches;
   TouchingPair* touching;

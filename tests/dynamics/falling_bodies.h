@@ -1,8 +1,8 @@
 #pragma once
 #include <vector>
 
-#include "dynamics/simulation.h"
 #include "dynamics/scene_contacts.h"
+#include "dynamics/simulation.h"
 #include "kernels/manifold/manifold_scene.h"
 
 namespace tandem::test {
@@ -37,7 +37,8 @@ struct FallingBodies {
       states.push_back(state_of(body, pose));
       if (i > 0) {
         const Pose turn = any_motion(random, 1);
-        states.back().angular_velocity = {3 * turn.rotation[0][1], 3 * turn.rotation[1][2], turn.rotation[2][0]};
+        states.back().angular_velocity = {3 * turn.rotation[0][1], 3 * turn.rotation[1][2],
+                                          turn.rotation[2][0]};
         states.back().velocity = {0.3 * turn.rotation[0][0], 0.3 * turn.rotation[1][1], -1};
       }
     }

@@ -27,7 +27,7 @@ class HostQuestions {
   }
 
   FoundManifolds manifolds(const PosedList& bodies, const PairList& pairs) {
-    place(with_pairs(bodies, pairs), nullptr);
+    place(bodies, nullptr);
     require(contacts_.find(scene_, {pairs.pairs, std::min(*pairs.count, pairs.most)}, {}), scene_);
     require(manifolds_.find(scene_, contacts_, {.match_previous = false}), scene_);
     manifold_count_ = static_cast<std::uint32_t>(manifolds_.rows().size());
@@ -57,14 +57,6 @@ class HostQuestions {
   }
 
  private:
-  // Others of moved bodies have no pose.
-  static PosedList with_pairs(PosedList bodies, const PairList& pairs) {
-    std::uint32_t count = 0;
-    for (std::uint32_t i = 0; i < std::min(*pairs.count, pairs.most); ++i)
-      count = std::max(count, pairs.pairs[i].b + 1);
-    bodies.count = count;
-    return bodies;
-  }
   void place(const PosedList& bodies, const Motion* motion) {
     std::vector<Instance> instances(bodies.count);
     for (std::uint32_t i = 0; i < bodies.count; ++i) instances[i] = {bodies.asset[i], bodies.pose[i]};

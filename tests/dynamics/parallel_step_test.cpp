@@ -73,7 +73,8 @@ TEST(ParallelStep, IsTheStepOfASimulation) {
     middle += counts.middle, ahead += counts.approaches, missed += counts.missed;
     contacts += static_cast<std::uint32_t>(record.contacts);
     for (std::size_t i = 0; i < bodies.states.size(); ++i)
-      ASSERT_TRUE(same_bytes(both.states()[i], both.simulation->states()[i])) << "step " << step << " body " << i;
+      ASSERT_TRUE(same_bytes(both.states()[i], both.simulation->states()[i]))
+          << "step " << step << " body " << i;
   }
   EXPECT_GT(middle, 100u);
   EXPECT_GT(ahead, 100u);
@@ -89,8 +90,10 @@ TEST(ParallelStep, SleepsAndWakesAsASimulationDoes) {
     slept += both.simulation->step().sleeping;
     ASSERT_EQ(both.parallel.step(1.0 / 60), Status::kOk) << step;
     for (std::uint32_t i = 0; i < bodies.states.size(); ++i) {
-      ASSERT_TRUE(same_bytes(both.states()[i], both.simulation->states()[i])) << "step " << step << " body " << i;
-      ASSERT_EQ(both.parallel.arrays().group[i] != Sleep::kAwake, both.simulation->sleeps(i)) << step << " " << i;
+      ASSERT_TRUE(same_bytes(both.states()[i], both.simulation->states()[i]))
+          << "step " << step << " body " << i;
+      ASSERT_EQ(both.parallel.arrays().group[i] != Sleep::kAwake, both.simulation->sleeps(i))
+          << step << " " << i;
     }
   }
   EXPECT_GT(slept, 100u);

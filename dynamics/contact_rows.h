@@ -75,6 +75,14 @@ struct StepNumbers : StepBodies {
   SolverOptions options;
 };
 
+/// The contacts of a pair of bodies, which are consecutive in the list of a step.
+struct ContactRange {
+  std::uint32_t first, count;
+
+  TANDEM_HD std::size_t size() const { return count; }
+  TANDEM_HD std::uint32_t operator[](std::size_t i) const { return first + static_cast<std::uint32_t>(i); }
+};
+
 /// Makes rows of the contacts of a step.
 class RowMaker {
  public:
@@ -86,12 +94,13 @@ class RowMaker {
     return body != kNoIndex && step_.bodies[body].motion == Motion::moving;
   }
 
-  /// Calls visit(i, contact, patch) for each contact of a pair, by place in `contacts`.
-  template <typename Visit>
-  TANDEM_HD void visit_contacts(std::span<const std::uint32_t> contacts, const Visit& visit) const {
+  /// Calls visit(i, contact, patch) for each contact of a pair, by place in `contacts`. Contacts: of numbers,
+  /// as ContactRange.
+  template <typename Contacts, typename Visit>
+  TANDEM_HD void visit_contacts(const Contacts& contacts, const Visit& visit) const {
     for (std::size_t begin = 0, end = 0; begin < contacts.size(); begin = end) {
       for (end = begin; end < contacts.size() && is_of_patch(contacts[begin], contacts[end]);) ++end;
-      const ContactPatch patch = patch_of(contacts.subspan(begin, end - begin));
+      const ContactPatch patch = patch_of(contacts, begin, end);
       for (std::size_t i = begin; i < end; ++i) visit(i, step_.contacts[contacts[i]], patch);
     }
   }
@@ -112,7 +121,8 @@ class RowMaker {
 
  private:
   TANDEM_HD bool is_of_patch(std::uint32_t first, std::uint32_t contact) const;
-  TANDEM_HD ContactPatch patch_of(std::span<const std::uint32_t> contacts) const;
+  template <typename Contacts>
+  TANDEM_HD ContactPatch patch_of(const Contacts& contacts, std::size_t begin, std::size_t end) const;
   TANDEM_HD double separation_of(const ContactPoint& contact, const ContactPatch& patch,
                                  const ContactMeeting& meeting) const;
   TANDEM_HD static double depth_at_start(const ContactPoint& contact, const ContactMeeting& meeting) {
@@ -158,16 +168,18 @@ TANDEM_HD inline bool RowMaker::is_of_patch(std::uint32_t first, std::uint32_t c
   return square(step_.contacts[contact].normal - step_.contacts[first].normal) < 1e-12;
 }
 
-TANDEM_HD inline ContactPatch RowMaker::patch_of(std::span<const std::uint32_t> contacts) const {
-  ContactPatch out = {&step_.contacts[contacts[0]], {}};
-  for (const std::uint32_t i : contacts) {
-    const ContactPoint& contact = step_.contacts[i];
+template <typename Contacts>
+TANDEM_HD ContactPatch RowMaker::patch_of(const Contacts& contacts, std::size_t begin,
+                                          std::size_t end) const {
+  ContactPatch out = {&step_.contacts[contacts[begin]], {}};
+  for (std::size_t k = begin; k < end; ++k) {
+    const ContactPoint& contact = step_.contacts[contacts[k]];
     if (contact.depth > out.deepest->depth) out.deepest = &contact;
   }
   const double least = std::min(0.0, out.deepest->depth);
   double shares = 0;
-  for (const std::uint32_t i : contacts) {
-    const ContactPoint& contact = step_.contacts[i];
+  for (std::size_t k = begin; k < end; ++k) {
+    const ContactPoint& contact = step_.contacts[contacts[k]];
     if (contact.depth < least) continue;
     const double share = step_.options.slop + std::max(0.0, contact.depth);
     out.centre += share * contact.position, shares += share;

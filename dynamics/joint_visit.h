@@ -6,13 +6,9 @@
 #include <vector>
 
 #include "dynamics/island_problem.h"
+#include "dynamics/softness.h"
 
 namespace tandem::dynamics {
-
-/// The numbers of a soft row: a damped spring, taken implicitly.
-struct Softness {
-  double bias_rate, mass_scale, impulse_scale;
-};
 
 /// The rows of one joint, as a sweep visits them: those that are held come first and are solved at once,
 /// because they act on each other about as much as on themselves.

@@ -4,6 +4,8 @@
 #include <span>
 #include <vector>
 
+#include "tandem/formats/platform.h"
+
 namespace tandem::dynamics {
 
 /// Two bodies that contacts move, or 0 for one that they do not.
@@ -12,6 +14,15 @@ struct ColouredPair {
   std::uint32_t order;  ///< in which pairs have their colours, below kColouredOrders
 };
 inline constexpr std::uint32_t kColouredOrders = 1 << 16;
+
+/// Returns the order of a pair of bodies by their places in the list of a step, or 0 for one that contacts do
+/// not move. It looks like chance.
+TANDEM_HD inline std::uint32_t colouring_order(std::uint32_t a, std::uint32_t b) {
+  std::uint64_t x = (std::uint64_t{a} << 32 | b) + 0x9E3779B97F4A7C15u;
+  x = (x ^ x >> 30) * 0xBF58476D1CE4E5B9u;
+  x = (x ^ x >> 27) * 0x94D049BB133111EBu;
+  return static_cast<std::uint32_t>(x >> 32) % kColouredOrders;
+}
 
 /// Returns a colour for each pair: no two pairs of a colour have a body in common, but for 0. Each pair has
 /// the first colour that those before it have left; so the colours of an island do not depend on what else

@@ -188,6 +188,14 @@ TANDEM_HD inline void advance(const BodyProperties& body, BodyState& state, cons
   rigid_body_detail::rotate(body, state, angular_correction, dt);
 }
 
+/// Moves a body that nothing holds by the mean velocity of the step, which is exact.
+TANDEM_HD inline void fly(const BodyProperties& body, const Pull& pull, double dt, BodyState& state) {
+  const Vector3 gain = dt * pull.linear, turn = dt * pull.angular;
+  state.velocity += gain;
+  state.angular_velocity += turn;
+  advance(body, state, -0.5 * gain, -0.5 * turn, dt);
+}
+
 double kinetic_energy(const BodyProperties& body, const BodyState& state);
 
 /// Returns the angular momentum about the world's origin. It is zero for a body that contacts do not move.

@@ -4,22 +4,9 @@
 #include <vector>
 
 #include "dynamics/joint_visit.h"
-#include "dynamics/soft_rows.h"
+#include "dynamics/soft_rules.h"
 
 namespace tandem::dynamics {
-
-inline void put(const Vector3& x, float (&to)[4]) {
-  to[0] = static_cast<float>(x.x), to[1] = static_cast<float>(x.y), to[2] = static_cast<float>(x.z),
-  to[3] = 0;
-}
-
-/// Lanes that are left out together may leave a zero its sign; here it has none.
-inline double unsigned_zero(float x) {
-  return x + 0.0;
-}
-inline Vector3 first_three(const float (&from)[4]) {
-  return {unsigned_zero(from[0]), unsigned_zero(from[1]), unsigned_zero(from[2])};
-}
 
 /// The joints of a soft step. One thread visits them, in float64, between the sweeps over contacts.
 class SoftJoints {

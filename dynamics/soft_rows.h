@@ -69,8 +69,8 @@ struct SoftPairs {
   std::uint32_t pairs = 0;                          ///< how many
   std::uint32_t first = 0;                          ///< of their rows
   std::uint32_t contacts = 0;                       ///< of the pair that has the most
-  bool bounces = false;                             ///< a rebound is more than 0
-  bool is_opposed = false;                          ///< an `opposed` is more than 0
+  std::uint32_t bounces = 0;                        ///< 1 where a rebound is more than 0
+  std::uint32_t is_opposed = 0;                     ///< 1 where an `opposed` is more than 0
   SoftNumber largest_residual, residual_squares;    ///< of the rows of each pair, a result
 };
 

@@ -13,77 +13,20 @@ constexpr std::size_t kBodiesAtOnce = 64;  // that a thread takes
 constexpr std::uint32_t kGroupsAtOnce = 4;
 constexpr std::uint32_t kSharedGroups = 6;  // that are worth the time in which threads wait for each other
 
-// Bits that look like chance, of a pair of bodies.
-std::uint32_t shuffled(std::uint32_t a, std::uint32_t b) {
-  std::uint64_t x = (std::uint64_t{a} << 32 | b) + 0x9E3779B97F4A7C15u;
-  x = (x ^ x >> 30) * 0xBF58476D1CE4E5B9u;
-  x = (x ^ x >> 27) * 0x94D049BB133111EBu;
-  return static_cast<std::uint32_t>(x >> 32);
-}
-
-void put(double x, SoftNumber& to, int lane) {
-  to.of[lane] = static_cast<float>(x);
-}
-void put(const Vector3& x, SoftNumber (&to)[3], int lane) {
-  put(x.x, to[0], lane), put(x.y, to[1], lane), put(x.z, to[2], lane);
-}
-void put(const MassScale& scale, SoftNumber (&to)[9], int lane) {
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) put(at(scale.spread.row[i], j), to[3 * i + j], lane);
-  }
-}
-double inverse_mass(const SteppedBody& body) {
-  return body.moves ? 1 / (body.scale.root_mass * body.scale.root_mass) : 0;
-}
-
-// Masses become so many times less as the square of `root`, a power of two.
-void measure_in(double root, SteppedBody& body) {
-  MassScale& scale = body.scale;
-  scale = {scale.root_mass / root, root * scale.inverse_root_mass, root * scale.spread};
-  body.velocity = 1 / root * body.velocity;
-  body.gravity = 1 / root * body.gravity;
-}
-
-Softness softness(double frequency, double damping_ratio, double h) {
-  const double omega = 2 * kPi * frequency;
-  const double a1 = 2 * damping_ratio + h * omega, a2 = h * omega * a1;
-  return {omega / a1, a2 / (1 + a2), 1 / (1 + a2)};
-}
-
-// Bodies that impact has driven into each other may be held from both sides: what pushes one way makes the
-// other deeper, the pushes are hundreds of times their weight, and whichever point is found next throws
-// them about. So a deep contact pushes for what it is deeper than the same pair's contacts that push
-// against it. Result: by how much.
-double opposed(std::span<const ContactPoint> all, std::span<const std::uint32_t> of_pair,
-               const Vector3& normal, double separation, double slop) {
-  constexpr double kDeep = 4;  // slops
-  const double deep = kDeep * slop;
-  if (separation > -deep) return 0;
-  double opposed = 0;
-  for (const std::uint32_t other : of_pair)
-    opposed = std::max(
-        opposed, -std::min(dot(normal, all[other].normal), 0.0) * std::max(all[other].depth - slop, 0.0));
-  return std::min(opposed, -deep - separation);
-}
-
 }  // namespace
 
 struct SoftSolver::Step {
   const StepInput& input;
   const SolverOptions& options;
-  RowMaker rows;
   std::span<const BodyState> states;
-  std::span<const ContactImpulse> impulses;
-  double h = input.dt / options.substeps;
-  Softness between_movers = softness(1 / (8 * h), 10, h), against_unmoved = softness(2 / (8 * h), 5, h),
-           joints = against_unmoved;
+  SoftNumbers numbers;
 };
 
 Residual SoftSolver::solve(const StepInput& input, std::span<const std::uint32_t> islands,
                            const SolverOptions& options, std::span<BodyState> states,
                            std::span<ContactImpulse> impulses) {
   if (islands.empty()) return {};
-  const Step step = {input, options, RowMaker({input, states, options}), states, impulses};
+  const Step step = {input, options, states, SoftNumbers({input, states, options}, impulses.data())};
   gather(step, islands);
   find_unit(step);
   make_groups(step);
@@ -99,25 +42,25 @@ Residual SoftSolver::solve(const StepInput& input, std::span<const std::uint32_t
 // Finds the bodies, contacts and pairs of the islands.
 void SoftSolver::gather(const Step& step, std::span<const std::uint32_t> islands) {
   const StepInput& input = step.input;
-  body_.assign(1, 0), contacts_.clear(), pairs_.clear();
+  body_.assign(1, 0), pairs_.clear();
   place_.resize(input.bodies.size());
   for (const std::uint32_t island : islands) {
     for (const std::uint32_t body : input.islands.bodies_of(island)) {
       place_[body] = static_cast<std::uint32_t>(body_.size());
       body_.push_back(body);
     }
-    const auto place = [&](std::uint32_t body) { return step.rows.is_moved(body) ? place_[body] : 0; };
+    const auto place = [&](std::uint32_t body) {
+      return step.numbers.rows.is_moved(body) ? place_[body] : 0;
+    };
     ObjectPair last = {0, 0};
     for (const std::uint32_t i : input.islands.contacts_of(island)) {
       const ContactPoint& contact = input.contacts[i];
       const ObjectPair pair = {contact.body_a, contact.body_b};
       if (pair != last) {
         last = pair;
-        pairs_.push_back(
-            {static_cast<std::uint32_t>(contacts_.size()), 0, place(pair.a), place(pair.b), 0, 0});
+        pairs_.push_back({{i, 0}, place(pair.a), place(pair.b), 0, 0});
       }
-      contacts_.push_back(i);
-      ++pairs_.back().contacts;
+      ++pairs_.back().contacts.count;
     }
   }
 }
@@ -125,7 +68,7 @@ void SoftSolver::gather(const Step& step, std::span<const std::uint32_t> islands
 std::vector<std::uint32_t> SoftSolver::find_colours() {
   coloured_.clear();
   for (const Pair& pair : pairs_)
-    coloured_.push_back({pair.a, pair.b, shuffled(body_[pair.a], body_[pair.b]) % kColouredOrders});
+    coloured_.push_back({pair.a, pair.b, colouring_order(body_[pair.a], body_[pair.b])});
   return dynamics::find_colours(coloured_, body_.size());
 }
 
@@ -153,12 +96,10 @@ std::vector<std::uint32_t> SoftSolver::find_regions(const Step& step, std::uint3
   return out;
 }
 
-// Masses are measured in a unit about as large as the heaviest, so that float32 has room for the others, and
-// whose root is a power of two, so that no digit depends on it.
 void SoftSolver::find_unit(const Step& step) {
   double most = 0;
   for (std::size_t i = 1; i < body_.size(); ++i) most = std::max(most, step.input.bodies[body_[i]].mass);
-  unit_root_ = std::ldexp(1.0, std::ilogb(most) / 2);
+  unit_root_ = unit_root_of(most);
 }
 
 // Gives each pair a place in a group of its colour and region, those with many contacts first, so that few
@@ -177,7 +118,7 @@ void SoftSolver::make_groups(const Step& step) {
     return colours[i] * regions + region_of[pairs_[i].a != 0 ? pairs_[i].a : pairs_[i].b];
   };
   order_ = sorted_by(all_below(pairs_.size()), kMany + 1,
-                     [&](std::uint32_t i) { return kMany - std::min(pairs_[i].contacts, kMany); });
+                     [&](std::uint32_t i) { return kMany - std::min(pairs_[i].contacts.count, kMany); });
   order_ = sorted_by(order_, std::size_t{colour_count} * regions, key);
   groups_.clear(), group_begin_.clear(), region_begin_.clear();
   std::uint32_t contacts = 0;
@@ -193,8 +134,9 @@ void SoftSolver::make_groups(const Step& step) {
     SoftPairs& group = groups_.back();
     pair.group = static_cast<std::uint32_t>(groups_.size() - 1);
     pair.lane = static_cast<int>(group.pairs++);
-    contacts += pair.contacts > group.contacts ? pair.contacts - group.contacts : 0;
-    group.contacts = std::max(group.contacts, pair.contacts);
+    const std::uint32_t count = pair.contacts.count;
+    contacts += count > group.contacts ? count - group.contacts : 0;
+    group.contacts = std::max(group.contacts, count);
   }
   region_begin_.resize(std::size_t{colour_count} * regions + 1, static_cast<std::uint32_t>(groups_.size()));
   group_begin_.push_back(static_cast<std::uint32_t>(order_.size()));
@@ -233,11 +175,10 @@ void SoftSolver::fill(const Step& step) {
   Threads& threads = step.input.threads;
   threads.for_parts(body_.size() - 1, kBodiesAtOnce, [&](std::size_t before) {
     const std::size_t i = before + 1;
-    bodies_[i] = step.rows.body(body_[i]);
-    measure_in(unit_root_, bodies_[i]);
-    put(step.h / bodies_[i].scale.root_mass * bodies_[i].gravity.linear, gains_[i].centre);
-    put(step.h * bodies_[i].gravity.angular, gains_[i].spin);
+    bodies_[i] = soft_body(step.numbers, unit_root_, body_[i]);
+    gains_[i] = gain_of(bodies_[i], step.numbers.h);
   });
+  const SoftRows rows = rows_of(step);
   threads.for_parts(groups_.size(), kGroupsAtOnce, [&](std::size_t group) {
     const auto clear = [&](auto& rows) {
       std::fill_n(rows.begin() + groups_[group].first, groups_[group].contacts,
@@ -245,61 +186,23 @@ void SoftSolver::fill(const Step& step) {
     };
     clear(normals_), clear(gaps_), clear(frictions_);
     turnings_[group] = {};
-    for (std::uint32_t k = group_begin_[group]; k < group_begin_[group + 1]; ++k)
-      fill_pair(step, pairs_[order_[k]]);
+    for (std::uint32_t k = group_begin_[group]; k < group_begin_[group + 1]; ++k) {
+      const Pair& pair = pairs_[order_[k]];
+      const SteppedBody &a = bodies_[pair.a], &b = bodies_[pair.b];
+      if (a.moves) groups_[group].body_a[pair.lane] = pair.a;
+      if (b.moves) groups_[group].body_b[pair.lane] = pair.b;
+      fill_pair(step.numbers, unit_root_, pair.contacts, a, b, rows, pair.group, pair.lane);
+    }
   });
 }
 
-void SoftSolver::fill_pair(const Step& step, const Pair& pair) {
-  SoftPairs& group = groups_[pair.group];
-  const int lane = pair.lane;
-  const SteppedBody &a = bodies_[pair.a], &b = bodies_[pair.b];
-  const std::span<const std::uint32_t> contacts =
-      std::span(contacts_).subspan(pair.first_contact, pair.contacts);
-  const double substeps = step.options.substeps * unit_root_ * unit_root_;  // in these masses
-  SoftTurning& turns = turnings_[pair.group];
-  if (a.moves) group.body_a[lane] = pair.a, put(a.scale, turns.spread_a, lane);
-  if (b.moves) group.body_b[lane] = pair.b, put(b.scale, turns.spread_b, lane);
-  put(inverse_mass(a), group.inverse_mass_a, lane), put(inverse_mass(b), group.inverse_mass_b, lane);
-  const Softness& soft = a.moves && b.moves ? step.between_movers : step.against_unmoved;
-  put(soft.bias_rate, group.bias_rate, lane), put(soft.mass_scale, group.mass_scale, lane);
-  put(soft.impulse_scale, group.impulse_scale, lane);
-  const Vector3 spin = b.scale.spread * b.velocity.angular - a.scale.spread * a.velocity.angular;
-  put(spin + step.rows.turning_drive(step.input.contacts[contacts[0]]), turns.drive, lane);
-  put(1 / turning_mobility(a, b), turns.mass, lane);
-  const Material material = step.rows.material_of(step.input.contacts[contacts[0]]);
-  put(material.rolling_resistance, turns.lever, lane);
-  Vector3 turning;
-  for (const std::uint32_t i : contacts) turning += step.impulses[i].turning;
-  put(turning / substeps, turns.impulse, lane);
-  step.rows.visit_contacts(
-      contacts, [&](std::size_t i, const ContactPoint& contact, const ContactPatch& patch) {
-        const ContactMeeting meets = step.rows.meeting(contact, patch, material);
-        const ContactImpulse& impulse = step.impulses[contacts[i]];
-        const auto [first, second] = Tangents(contact.normal);
-        SoftNormal& normal = normals_[group.first + i];
-        put(contact.normal, normal.direction.along, lane);
-        put(meets.arm_a, normal.direction.turn_a, lane), put(meets.arm_b, normal.direction.turn_b, lane);
-        put(1.0, normal.mass, lane);
-        put(meets.separation, normal.followed, lane);
-        put(impulse.normal / substeps, normal.impulse, lane);
-        SoftGap& gap = gaps_[group.first + i];
-        const double less =
-            opposed(step.input.contacts, contacts, contact.normal, meets.separation, step.options.slop);
-        put(meets.separation, gap.separation, lane), put(meets.rebound, gap.rebound, lane);
-        put(less, gap.opposed, lane);
-        group.bounces = group.bounces || meets.rebound > 0;
-        group.is_opposed = group.is_opposed || less > 0;
-        SoftFriction& friction = frictions_[group.first + i];
-        put(first, friction.first.along, lane), put(second, friction.second.along, lane);
-        put(meets.velocity, friction.first.turn_a, lane);
-        put(impulse.tangential / substeps, friction.second.turn_a, lane);
-        put(material.friction, friction.coefficient, lane);
-      });
+SoftRows SoftSolver::rows_of(const Step& step) {
+  return {velocities_.data(), moved_.data(), groups_.data(),    turnings_.data(),
+          normals_.data(),    gaps_.data(),  frictions_.data(), static_cast<float>(1 / step.numbers.h)};
 }
 
 void SoftSolver::run(const Step& step) {
-  constexpr int kRelaxingSweeps = 2, kRestitutionSweeps = 10;
+  const double h = step.numbers.h;
   struct Phase {
     Work work;
     SweepPart part = {};
@@ -318,23 +221,21 @@ void SoftSolver::run(const Step& step) {
   add_joints(Work::push_joints);
   for (std::uint32_t k = 0; k < step.options.substeps; ++k) {
     phases.push_back({k == 0 ? Work::begin : Work::accelerate});
-    add_joints(Work::visit_soft_joints, k * step.h);
+    add_joints(Work::visit_soft_joints, k * h);
     add_sweep(passes.push);
     phases.push_back({Work::move});
-    add_joints(Work::follow_joints, (k + 1) * step.h);
+    add_joints(Work::follow_joints, (k + 1) * h);
     for (int sweep = 0; sweep < kRelaxingSweeps; ++sweep) {
       add_joints(Work::visit_joints);
-      add_sweep(sweep == 0 ? passes.follow : passes.relax, (k + 1) * step.h);
+      add_sweep(sweep == 0 ? passes.follow : passes.relax, (k + 1) * h);
     }
     add_sweep(passes.rub);
   }
-  if (std::ranges::any_of(groups_, &SoftPairs::bounces)) {
+  if (std::ranges::any_of(groups_, [](const SoftPairs& group) { return group.bounces != 0; })) {
     for (int sweep = 0; sweep < kRestitutionSweeps; ++sweep) add_sweep(passes.rebound);
   }
   add_sweep(passes.judge);
-  const SoftRows rows = {
-      velocities_.data(), moved_.data(), groups_.data(),    turnings_.data(),
-      normals_.data(),    gaps_.data(),  frictions_.data(), static_cast<float>(1 / step.h)};
+  const SoftRows rows = rows_of(step);
   run_phases(step.input.threads, regions_, phases.size(),
              [&](std::size_t phase, std::uint32_t i, std::uint32_t n) {
                const auto& [work, part, pass, time] = phases[phase];
@@ -342,7 +243,11 @@ void SoftSolver::run(const Step& step) {
                  if (i == 0) work_on_joints(step, work, time);
                } else if (work != Work::pass) {
                  const auto [begin, end] = part_of(body_.size(), i, n);
-                 for (std::size_t j = begin; j < end; ++j) visit_body(j, work, static_cast<float>(step.h));
+                 for (std::size_t j = begin; j < end; ++j)
+                   work_on(work == Work::begin        ? BodyWork::begin
+                           : work == Work::accelerate ? BodyWork::accelerate
+                                                      : BodyWork::move,
+                           static_cast<float>(h), gains_[j], start_[j], velocities_[j], moved_[j]);
                } else if (part.region_begin != nullptr) {
                  for (std::uint32_t region = i; region < regions_; region += n)
                    pass(rows, part.region_begin[region], part.region_begin[region + 1], time);
@@ -352,64 +257,26 @@ void SoftSolver::run(const Step& step) {
              });
 }
 
-// The contacts of a substep begin with what they added to the velocities in the one before.
-void SoftSolver::visit_body(std::size_t i, Work work, float h) {
-  const auto visit = [&](float gain, float& start, float& velocity, float& moved) {
-    if (work == Work::move) {
-      moved += h * velocity;
-      return;
-    }
-    const float pushed = work == Work::begin ? velocity : velocity - start;
-    start = (work == Work::begin ? 0 : velocity) + gain;
-    velocity = start + pushed;
-  };
-  for (int k = 0; k < 3; ++k) {
-    visit(gains_[i].centre[k], start_[i].centre[k], velocities_[i].centre[k], moved_[i].centre[k]);
-    visit(gains_[i].spin[k], start_[i].spin[k], velocities_[i].spin[k], moved_[i].spin[k]);
-  }
-}
-
 void SoftSolver::work_on_joints(const Step& step, Work work, double time) {
   if (work == Work::push_joints) return joints_.push(velocities_);
   if (work == Work::follow_joints) return joints_.follow(moved_, time);
-  if (work == Work::visit_joints) return joints_.visit(velocities_, step.h, nullptr);
+  if (work == Work::visit_joints) return joints_.visit(velocities_, step.numbers.h, nullptr);
   if (time > 0) joints_.sum_up();  // of the substep before
   joints_.add_due(velocities_);
-  joints_.visit(velocities_, step.h, &step.joints);
+  joints_.visit(velocities_, step.numbers.h, &step.numbers.against_unmoved);
 }
 
-void SoftSolver::write(const Step& step, std::span<BodyState> states,
-                       std::span<ContactImpulse> impulses) const {
+void SoftSolver::write(const Step& step, std::span<BodyState> states, std::span<ContactImpulse> impulses) {
   step.input.threads.for_parts(body_.size() - 1, kBodiesAtOnce, [&](std::size_t before) {
     const std::size_t i = before + 1;
-    const SteppedBody& body = bodies_[i];
-    const auto added = [&](const SoftMotion& motion) {
-      return Vector6{body.scale.root_mass * first_three(motion.centre), first_three(motion.spin)};
-    };
-    apply_motion(step.input.bodies[body_[i]], body.scale, body.velocity + added(velocities_[i]),
-                 step.input.dt * body.velocity + added(moved_[i]), step.input.dt, states[body_[i]]);
+    end_step(step.input.bodies[body_[i]], bodies_[i], velocities_[i], moved_[i], step.input.dt,
+             states[body_[i]]);
   });
-  const double substeps = step.options.substeps * unit_root_ * unit_root_;
+  const SoftRows rows = rows_of(step);
+  ContactImpulse* const done = step.input.done.empty() ? nullptr : step.input.done.data();
   step.input.threads.for_parts(pairs_.size(), kBodiesAtOnce, [&](std::size_t k) {
     const Pair& pair = pairs_[k];
-    const SoftNumber(&turns)[3] = turnings_[pair.group].impulse;
-    const auto of = [&](const SoftNumber& number) { return unsigned_zero(number.of[pair.lane]); };
-    const Vector3 turning = {of(turns[0]), of(turns[1]), of(turns[2])};
-    for (std::uint32_t i = 0; i < pair.contacts; ++i) {
-      const std::uint32_t contact = contacts_[pair.first_contact + i], row = groups_[pair.group].first + i;
-      const Tangents across(step.input.contacts[contact].normal);
-      const SoftFriction& friction = frictions_[row];
-      const auto impulse = [&](double scale, double normal, double along_first, double along_second) {
-        return ContactImpulse{scale * normal,
-                              scale * (along_first * across.first + along_second * across.second),
-                              substeps / pair.contacts * turning};
-      };
-      impulses[contact] = impulse(substeps, of(normals_[row].impulse), of(friction.first_impulse),
-                                  of(friction.second_impulse));
-      if (!step.input.done.empty())
-        step.input.done[contact] = impulse(unit_root_ * unit_root_, of(friction.sum_of_normal),
-                                           of(friction.sum_of_first), of(friction.sum_of_second));
-    }
+    write_pair(step.numbers, unit_root_, pair.contacts, rows, pair.group, pair.lane, impulses.data(), done);
   });
 }
 

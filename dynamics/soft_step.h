@@ -33,7 +33,7 @@ class SoftSolver {
  private:
   /// The contacts of two bodies, these by place in bodies_, and where their rows are.
   struct Pair {
-    std::uint32_t first_contact, contacts;  ///< in contacts_
+    ContactRange contacts;
     std::uint32_t a, b;
     std::uint32_t group;
     int lane;
@@ -62,11 +62,10 @@ class SoftSolver {
   void make_groups(const Step& step);
   void find_parts();
   void fill(const Step& step);
-  void fill_pair(const Step& step, const Pair& pair);
+  SoftRows rows_of(const Step& step);
   void run(const Step& step);
-  void visit_body(std::size_t body, Work work, float h);
   void work_on_joints(const Step& step, Work work, double time);
-  void write(const Step& step, std::span<BodyState> states, std::span<ContactImpulse> impulses) const;
+  void write(const Step& step, std::span<BodyState> states, std::span<ContactImpulse> impulses);
   Residual residual() const;
 
   // Kept from step to step for their memory alone. The first of bodies stands for all that contacts do not
@@ -74,7 +73,6 @@ class SoftSolver {
   std::vector<std::uint32_t> body_, place_;  // of each place, and of each body of the step
   double unit_root_ = 1;                     // of the unit of masses
   std::vector<SteppedBody> bodies_;
-  std::vector<std::uint32_t> contacts_;
   std::vector<Pair> pairs_;
   std::vector<ColouredPair> coloured_;
   std::vector<std::uint32_t> order_;         // of pairs, group by group

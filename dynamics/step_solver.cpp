@@ -11,14 +11,6 @@
 namespace tandem::dynamics {
 namespace {
 
-// Moves by the mean velocity of the step, which is exact.
-void fly(const StepInput& input, std::uint32_t body, std::span<BodyState> states) {
-  const Vector3 gain = input.dt * input.pulls[body].linear, turn = input.dt * input.pulls[body].angular;
-  states[body].velocity += gain;
-  states[body].angular_velocity += turn;
-  advance(input.bodies[body], states[body], -0.5 * gain, -0.5 * turn, input.dt);
-}
-
 // Returns whether factorising the island's matrix costs no more than what Newton's method has to do for each
 // contact: with bodies by layer the matrix is a band, and eliminating w bodies that hang together with as
 // many of the next layer takes about (6 w)^3 multiplications.
@@ -75,7 +67,8 @@ class IslandSolver final : public StepSolver {
     std::vector<std::optional<Residual>> by_newton(input.islands.size());
     input.threads.for_each(input.islands.size(), [&](std::size_t i) {
       if (input.islands.flies(i)) {
-        for (const std::uint32_t body : input.islands.bodies_of(i)) fly(input, body, states);
+        for (const std::uint32_t body : input.islands.bodies_of(i))
+          fly(input.bodies[body], input.pulls[body], input.dt, states[body]);
         return;
       }
       const Plan plan = plan_of(input, i, layers);

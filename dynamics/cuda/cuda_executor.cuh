@@ -9,6 +9,7 @@
 #include <cub/device/device_select.cuh>
 #include <span>
 
+#include "dynamics/parallel/worker.h"
 #include "kernels/common/cub_code.cuh"
 #include "tandem/formats/gpu_memory.h"
 #include "tandem/formats/gpu_status.h"
@@ -46,6 +47,11 @@ struct FillBehind {
     if (i >= *count) keys[i] = 0xFFFFFFFFu;
   }
 };
+template <typename Visit>
+__global__ void __launch_bounds__(128) visit_together(const __grid_constant__ Visit visit) {
+  // The first teams are in different blocks, so that few teams have a processor each.
+  visit(Worker{threadIdx.x / 32 * gridDim.x + blockIdx.x, blockDim.x / 32 * gridDim.x, threadIdx.x % 32, 32});
+}
 
 /// Returns the values of an array, and 0 behind the last of them.
 struct ValueOrZero {
@@ -107,6 +113,28 @@ class CudaExecutor {
     const std::uint32_t blocks = std::min((most - 1) / kThreads + 1, kMostBlocks);
     visit_each<<<blocks, kThreads, 0, stream_>>>(visit, count, most);
     take(cudaGetLastError());
+  }
+
+  template <typename Visit>
+  void together(std::uint32_t most_teams, const Visit& visit) {
+    constexpr int kThreads = 128;
+    if (most_teams == 0 || error_ != cudaSuccess) return;
+    int device = 0, processors = 0, blocks_of_processor = 0;
+    take(cudaGetDevice(&device));
+    take(cudaDeviceGetAttribute(&processors, cudaDevAttrMultiProcessorCount, device));
+    take(cudaOccupancyMaxActiveBlocksPerMultiprocessor(&blocks_of_processor, visit_together<Visit>, kThreads,
+                                                       0));
+    if (error_ != cudaSuccess) return;
+    // A cooperative launch fails unless all blocks fit at once.
+    cudaLaunchAttribute cooperative = {};
+    cooperative.id = cudaLaunchAttributeCooperative;
+    cooperative.val.cooperative = 1;
+    cudaLaunchConfig_t launch = {};
+    launch.gridDim = dim3(std::min(most_teams, static_cast<std::uint32_t>(processors * blocks_of_processor)));
+    launch.blockDim = dim3(kThreads);
+    launch.stream = stream_;
+    launch.attrs = &cooperative, launch.numAttrs = 1;
+    take(cudaLaunchKernelEx(&launch, visit_together<Visit>, visit));
   }
 
   template <typename Visit>

@@ -18,6 +18,16 @@ TANDEM_HD inline void atomic_least(std::uint32_t& of, std::uint32_t x) {
 #endif
 }
 
+TANDEM_HD inline void atomic_most(std::uint32_t& of, std::uint32_t x) {
+#ifdef __CUDA_ARCH__
+  atomicMax(&of, x);
+#else
+  std::atomic_ref<std::uint32_t> to(of);
+  for (std::uint32_t now = to.load(); x > now && !to.compare_exchange_weak(now, x);) {
+  }
+#endif
+}
+
 /// Condition: both are not less than 0.
 TANDEM_HD inline void atomic_most(double& of, double x) {
 #ifdef __CUDA_ARCH__

@@ -5,7 +5,8 @@
 #include <span>
 #include <vector>
 
-#include "dynamics/threads.h"
+#include "dynamics/parallel/worker.h"
+#include "dynamics/phases.h"
 #include "tandem/formats/status.h"
 
 namespace tandem::dynamics {
@@ -39,12 +40,29 @@ class HostExecutor {
 
   explicit HostExecutor(Threads& threads) : threads_(threads) {}
 
+  /// Makes room for sums and sorting of so many.
+  Status reserve(std::uint32_t most) {
+    static_cast<void>(most);
+    return Status::kOk;
+  }
+
   /// Calls visit(i) for each i below the count, or below `most` where count is null, in no order and side by
   /// side.
   template <typename Visit>
   void for_each(const std::uint32_t* count, std::uint32_t most, const Visit& visit) {
     const std::uint32_t all = below(count, most);
     threads_.for_parts(all, kAtOnce, [&](std::size_t i) { visit(static_cast<std::uint32_t>(i)); });
+  }
+
+  /// Calls visit(worker) for the workers of at most so many teams, all of which run at once, so that they may
+  /// wait for each other. How many come is chance.
+  template <typename Visit>
+  void together(std::uint32_t most_teams, const Visit& visit) {
+    const std::uint32_t teams = std::min(most_teams, threads_.count());
+    if (teams == 0) return;
+    run_phases(threads_, teams, 1, [&](std::size_t, std::uint32_t i, std::uint32_t n) {
+      visit(Worker{i, n, 0, 1});
+    });
   }
 
   /// Calls visit().
@@ -99,8 +117,6 @@ class HostExecutor {
     return Status::kOk;
   }
 
-  /// Makes room for sums, lists and sorting of so many.
-  Status reserve(std::uint32_t) { return Status::kOk; }
   Status status() const { return Status::kOk; }
 
  private:

@@ -7,10 +7,18 @@
 
 #include "dynamics/parallel/pair_step.h"
 #include "dynamics/parallel/sleep_step.h"
+#include "dynamics/parallel/soft_step.h"
 
 namespace tandem::dynamics {
 
 namespace parallel_simulation_detail {
+
+// States stay where they are, since others look at them.
+struct StatesGoOn {
+  BodyState *before, *start;
+  const BodyState* end;
+  TANDEM_HD void operator()(std::uint32_t i) const { before[i] = start[i], start[i] = end[i]; }
+};
 
 struct CountsGoOn {
   StepCounts* counts;
@@ -42,16 +50,11 @@ struct ParallelOptions {
 ///   Status make_room(bool& grew);  after them: says what was wrong with them, or makes room where some had
 ///                                  too little
 ///   Status reserve(std::uint32_t bodies, std::uint32_t pairs);
-/// Solver:
-///   Status reserve(std::uint32_t bodies, std::uint32_t pairs, std::uint32_t contacts);
-///   void solve(Executor&, const StepArrays&);
-///   Status make_room(bool& grew);
-template <typename Executor, typename Questions, typename Solver>
+template <typename Executor, typename Questions>
 class ParallelSimulation {
  public:
   /// What the arguments refer to must outlive this.
-  ParallelSimulation(Executor& executor, Questions& questions, Solver& solver)
-      : to_(executor), ask_(questions), solver_(solver) {}
+  ParallelSimulation(Executor& executor, Questions& questions) : to_(executor), ask_(questions) {}
 
   /// Places all bodies anew. There are no contacts then.
   Status set_bodies(const ParallelBodies& bodies, const ParallelOptions& options) {
@@ -128,7 +131,7 @@ class ParallelSimulation {
     ask_.forget_needs();
     step.find_contacts(within_);
     for (int times = 1;; ++times) {
-      solver_.solve(to_, step.a);
+      solve(step.a);
       step.find_surprised();
       const Status status = read(whole);
       if (status != Status::kOk || !whole) return status;
@@ -141,12 +144,20 @@ class ParallelSimulation {
     }
   }
 
+  void solve(const StepArrays& a) {
+    solver_.step(to_,
+                 {a.acting, a.start, a.pulls, a.bodies, a.contacts, a.impulses_before, a.touching,
+                  &a.counts->touching, a.most_pairs, a.dt},
+                 a.options, {a.end, a.impulses, a.done});
+  }
+
   // Reads the counts, and makes room where there is too little: then the step is not whole.
   Status read(bool& whole) {
     Status status = to_.copy(static_cast<const StepCounts*>(counts_.data()), std::span(&read_, 1));
     bool grew = false;
     if (status == Status::kOk) status = ask_.make_room(grew);
-    if (status == Status::kOk) status = solver_.make_room(grew);
+    SoftStepNeeds solver = {};
+    if (status == Status::kOk) status = to_.copy(solver_.needs(), std::span(&solver, 1));
     const double needed = read_.reach.farthest(0.5 * options_.solver.slop);
     if (needed > within_) within_ = 1.5 * needed, grew = true;
     if (status == Status::kOk && read_.pairs > most_pairs_) {
@@ -162,13 +173,19 @@ class ParallelSimulation {
       grew = true;
       status = reserve_contacts(read_.found + read_.found / 4, read_.remembered + read_.remembered / 4);
     }
+    if (status == Status::kOk && !grew && solver.has_room == 0) {
+      grew = true;
+      status = solver_.reserve(
+          to_, {bodies_, most_pairs_, solver.groups + solver.groups / 4, solver.rows + solver.rows / 4});
+    }
     whole = !grew;
     return status;
   }
 
   // The results of a step become what the next one begins with.
   Status go_on() {
-    std::swap(states_[0], states_[1]), std::swap(states_[1], states_[2]);
+    const StepArrays a = arrays();
+    to_.for_each(nullptr, bodies_, parallel_simulation_detail::StatesGoOn{a.before, a.start, a.end});
     std::swap(records_[0], records_[1]), std::swap(remembered_[0], remembered_[1]);
     within_ = 1.25 * read_.reach.farthest(0.5 * options_.solver.slop);
     to_.once(parallel_simulation_detail::CountsGoOn{counts_.data()});
@@ -219,7 +236,8 @@ class ParallelSimulation {
       if (out == Status::kOk) out = status;
     }
     most_pairs_ = out == Status::kOk ? pairs : 0;
-    return out == Status::kOk ? solver_.reserve(bodies_, most_pairs_, most_remembered_) : out;
+    return out == Status::kOk ? solver_.reserve(to_, usual_room(bodies_, most_pairs_, most_remembered_))
+                              : out;
   }
 
   Status reserve_moved(std::uint32_t rows) {
@@ -250,12 +268,12 @@ class ParallelSimulation {
     }
     if (out != Status::kOk) return out;
     most_found_ = found, most_remembered_ = remembered;
-    return solver_.reserve(bodies_, most_pairs_, most_remembered_);
+    return solver_.reserve(to_, usual_room(bodies_, most_pairs_, most_remembered_));
   }
 
   Executor& to_;
   Questions& ask_;
-  Solver& solver_;
+  ParallelSoftStep<Executor> solver_;
   ParallelOptions options_;
   std::uint32_t bodies_ = 0, most_pairs_ = 0, most_moved_ = 0, most_found_ = 0, most_remembered_ = 0;
   double within_ = 0;  // how far apart near pairs are
@@ -282,7 +300,7 @@ class ParallelSimulation {
   Array<std::uint32_t> moved_asset_;
   Array<Pose> moved_pose_;
   Array<Approach> approaches_;
-  Array<TouchingPair> touching_;
+  Array<ContactPair> touching_;
   Array<ContactPoint> found_, contacts_;
   Array<CachedContact> remembered_[2];
   Array<std::uint32_t> place_;

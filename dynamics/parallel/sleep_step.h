@@ -83,7 +83,7 @@ void sleep_step(Executor& to, const StepArrays& a, const SleepOptions& options) 
   }
   to.for_each(nullptr, a.bodies, [of] TANDEM_HD(std::uint32_t i) { of.label[i] = i, of.marks[i] = 0; });
   to.for_each(&of.counts->touching, a.most_pairs, [of] TANDEM_HD(std::uint32_t i) {
-    const TouchingPair& pair = of.touching[i];
+    const ContactPair& pair = of.touching[i];
     if (of.is_moved(pair.a) && of.is_moved(pair.b)) join(of.label, pair.a, pair.b);
   });
   to.for_each(nullptr, a.bodies, [of] TANDEM_HD(std::uint32_t i) { of.label[i] = first_of(of.label, i); });

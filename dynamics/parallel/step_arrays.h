@@ -3,6 +3,7 @@
 #include <span>
 
 #include "dynamics/pair_ahead.h"
+#include "dynamics/parallel/contact_pair.h"
 #include "dynamics/remembered_contacts.h"
 #include "dynamics/rigid_body.h"
 #include "dynamics/step_solver.h"
@@ -35,11 +36,6 @@ struct PairPlan {
   bool is_asked;                       ///< for contacts where the bodies stand
   double reach;                        ///< see PairReach
   std::uint32_t first_found, found;    ///< contacts
-};
-
-/// A pair whose contacts push bodies.
-struct TouchingPair {
-  std::uint32_t a, b, first, count;  ///< bodies; contacts of the step
 };
 
 /// Counts of a step. Each is what there is, also where there is no room for so many.
@@ -90,7 +86,7 @@ struct StepArrays {
   std::uint32_t* moved_asset;          ///< two for each such row
   Pose* moved_pose;
   Approach* approaches;
-  TouchingPair* touching;
+  ContactPair* touching;
 
   // Of each contact: most_found of those found, most_remembered of the others.
   std::uint32_t most_found, most_remembered;

@@ -74,39 +74,4 @@ class HostQuestions {
   std::uint32_t near_count_ = 0, most_pairs_ = 0, manifold_count_ = 0, point_count_ = 0;
 };
 
-/// Solves a parallel step by the solver of Simulation.
-class HostSolver {
- public:
-  explicit HostSolver(const SolverOptions& options, Threads& threads)
-      : solver_(make_step_solver(options)), threads_(threads) {}
-
-  Status reserve(std::uint32_t, std::uint32_t, std::uint32_t) { return Status::kOk; }
-  Status make_room(bool&) { return Status::kOk; }
-
-  void solve(HostExecutor&, const StepArrays& a) {
-    std::vector<ContactPoint> contacts;
-    std::vector<ContactImpulse> impulses;
-    std::vector<std::uint32_t> place;
-    for (std::uint32_t i = 0; i < a.counts->touching; ++i) {
-      const TouchingPair& pair = a.touching[i];
-      for (std::uint32_t k = pair.first; k < pair.first + pair.count; ++k) {
-        contacts.push_back(a.contacts[k]), impulses.push_back(a.impulses_before[k]), place.push_back(k);
-      }
-    }
-    std::vector<BodyState> states(a.start, a.start + a.bodies);
-    std::vector<ContactImpulse> done(contacts.size());
-    const std::span<const BodyProperties> bodies(a.acting, a.bodies);
-    const Islands islands = find_islands(bodies, contacts);
-    solver_->step({{bodies, contacts, a.dt, {a.pulls, a.bodies}}, islands, 0, false, threads_, {}, {}, done},
-                  states, impulses);
-    std::ranges::copy(states, a.end);
-    for (std::size_t i = 0; i < place.size(); ++i)
-      a.impulses[place[i]] = impulses[i], a.done[place[i]] = done[i];
-  }
-
- private:
-  std::unique_ptr<StepSolver> solver_;
-  Threads& threads_;
-};
-
 }  // namespace tandem::dynamics

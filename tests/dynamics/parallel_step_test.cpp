@@ -24,8 +24,7 @@ class BothWays {
       : threads_(threads),
         executor_(threads_),
         questions_(of.assets.views()),
-        solver_(options_of(of, sleep).solver, threads_),
-        parallel(executor_, questions_, solver_) {
+        parallel(executor_, questions_) {
     const SimulationOptions options = options_of(of, sleep);
     SimulationParts parts;
     parts.contacts = make_scene_contacts(of.assets.views(), 1);
@@ -55,11 +54,10 @@ class BothWays {
   Threads threads_;
   HostExecutor executor_;
   HostQuestions questions_;
-  HostSolver solver_;
 
  public:
   std::unique_ptr<Simulation> simulation;
-  ParallelSimulation<HostExecutor, HostQuestions, HostSolver> parallel;
+  ParallelSimulation<HostExecutor, HostQuestions> parallel;
 };
 
 TEST(ParallelStep, IsTheStepOfASimulation) {

@@ -229,7 +229,7 @@ struct CubeStep {
     std::vector<ContactImpulse> impulses(contacts.size());
     std::vector<BodyState> moved = states;
     make_step_solver({.kind = SolverKind::soft, .restitution = 0.3})
-        ->step({bodies, contacts, islands, 1.0 / 60, pulls, 0, true, threads}, moved, impulses);
+        ->step({{bodies, contacts, 1.0 / 60, pulls}, islands, 0, true, threads}, moved, impulses);
     return moved;
   }
 };

@@ -1,0 +1,7 @@
+#include "dynamics/cuda/parallel_soft_step.cuh"
+
+namespace tandem::dynamics {
+
+template class ParallelSoftStep<CudaExecutor>;
+
+}  // namespace tandem::dynamics

@@ -1,0 +1,9 @@
+#pragma once
+#include "dynamics/cuda/cuda_executor.cuh"
+#include "dynamics/parallel/soft_step.h"
+
+namespace tandem::dynamics {
+
+extern template class ParallelSoftStep<CudaExecutor>;
+
+}  // namespace tandem::dynamics

@@ -1,0 +1,63 @@
+#pragma once
+#include <atomic>
+#include <cstdint>
+#include <thread>
+
+#include "tandem/formats/platform.h"
+
+/// Workers that run at once read and write things by turns: each knows how many turns come before its own,
+/// waits until the thing is at that turn, and hands on what it has made of the thing. So a thing needs no
+/// lock, no barrier and no fence: its number of the turn and its data are read and written in one piece.
+namespace tandem::dynamics {
+
+/// Twelve bytes, and how many have had their turn at them.
+struct alignas(16) TurnWord {
+  std::uint32_t data[3];
+  std::uint32_t turn;
+};
+
+/// Returns the word as it is now. If its turn is `turn` then the data are right, and stay: only who has the
+/// turn may hand the word on.
+TANDEM_HD inline TurnWord look_for_turn(const TurnWord& from, std::uint32_t turn) {
+#ifdef __CUDA_ARCH__
+  // 16 bytes are one access, to the cache that all processors share.
+  static_cast<void>(turn);
+  std::uint64_t low, high;
+  asm volatile("{ .reg .b128 word; ld.relaxed.gpu.global.b128 word, [%2]; mov.b128 {%0, %1}, word; }"
+               : "=l"(low), "=l"(high)
+               : "l"(__cvta_generic_to_global(&from))
+               : "memory");
+  return {{static_cast<std::uint32_t>(low), static_cast<std::uint32_t>(low >> 32),
+           static_cast<std::uint32_t>(high)},
+          static_cast<std::uint32_t>(high >> 32)};
+#else
+  TurnWord out = {};
+  out.turn = std::atomic_ref(const_cast<std::uint32_t&>(from.turn)).load(std::memory_order_acquire);
+  for (int i = 0; i < 3 && out.turn == turn; ++i) out.data[i] = from.data[i];
+  return out;
+#endif
+}
+
+/// Hands on the word with these data to whose turn is `turn`.
+TANDEM_HD inline void give_turn(TurnWord& to, std::uint32_t turn, const std::uint32_t (&data)[3]) {
+#ifdef __CUDA_ARCH__
+  const std::uint64_t low = data[0] | std::uint64_t{data[1]} << 32,
+                      high = data[2] | std::uint64_t{turn} << 32;
+  asm volatile(
+      "{ .reg .b128 word; mov.b128 word, {%0, %1}; st.relaxed.gpu.global.b128 [%2], word; }" ::"l"(low),
+      "l"(high), "l"(__cvta_generic_to_global(&to))
+      : "memory");
+#else
+  for (int i = 0; i < 3; ++i) to.data[i] = data[i];
+  std::atomic_ref(to.turn).store(turn, std::memory_order_release);
+#endif
+}
+
+/// Lets others run, where whoever has the turn may be waiting for a processor.
+TANDEM_HD inline void wait_for_turn() {
+#ifndef __CUDA_ARCH__
+  std::this_thread::yield();
+#endif
+}
+
+}  // namespace tandem::dynamics

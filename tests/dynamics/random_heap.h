@@ -1,0 +1,117 @@
+#pragma once
+#include <algorithm>
+#include <cstdint>
+#include <random>
+#include <set>
+#include <vector>
+
+#include "dynamics/parallel/soft_step.h"
+#include "dynamics/step_solver.h"
+
+namespace tandem::dynamics {
+
+/// Says of what a RandomHeap is made.
+struct HeapOptions {
+  std::uint32_t bodies = 200, pairs = 600;
+  std::uint32_t most_contacts = 6;  ///< of a pair
+  std::uint32_t hub = 0;            ///< so many bodies touch body 0 too, which then moves
+  bool is_near = false;             ///< bodies touch those next in the list
+  unsigned seed = 1;
+};
+
+/// Bodies with random contacts: some are fixed or kinematic, some bounce, and contacts are deep, open, and of
+/// one or of several directions.
+struct RandomHeap {
+  std::vector<BodyProperties> bodies;
+  std::vector<BodyState> states;
+  std::vector<Pull> pulls;
+  std::vector<ContactPoint> contacts;
+  std::vector<ContactImpulse> impulses;
+  std::vector<ContactPair> pairs;
+  SolverOptions options = {.kind = SolverKind::soft, .restitution = 0.2};
+  double dt = 1.0 / 60;
+
+  explicit RandomHeap(const HeapOptions& heap) : random_(heap.seed) {
+    bodies.resize(heap.bodies), states.resize(heap.bodies), pulls.resize(heap.bodies);
+    for (std::uint32_t i = 0; i < heap.bodies; ++i) make_body(i);
+    if (heap.hub > 0) bodies[0].motion = Motion::moving;
+    std::set<std::pair<std::uint32_t, std::uint32_t>> touching;
+    for (std::uint32_t i = 1; i <= heap.hub; ++i) touching.insert({0, i});
+    while (touching.size() < heap.pairs + heap.hub) {
+      const std::uint32_t a = below(heap.bodies);
+      const std::uint32_t b = heap.is_near ? (a + 1 + below(12)) % heap.bodies : below(heap.bodies);
+      if (a != b) touching.insert({std::min(a, b), std::max(a, b)});
+    }
+    for (const auto& [a, b] : touching) touch(a, b, 1 + below(heap.most_contacts));
+  }
+
+  /// Returns the step of these, of which `impulses` and `done` are changed.
+  StepBodies step() const { return {bodies, contacts, dt, pulls}; }
+
+ private:
+  std::uint32_t below(std::uint32_t most) { return static_cast<std::uint32_t>(random_() % most); }
+  double number(double low, double high) {
+    return std::uniform_real_distribution<double>(low, high)(random_);
+  }
+  Vector3 any(double most) { return {number(-most, most), number(-most, most), number(-most, most)}; }
+
+  void make_body(std::uint32_t i) {
+    BodyProperties& body = bodies[i];
+    const std::uint32_t kind = below(20);
+    body.motion = kind == 0 ? Motion::fixed : kind == 1 ? Motion::kinematic : Motion::moving;
+    body.mass = number(0.5, 20);
+    body.radius = 1;
+    const Vector3 moments = {body.mass * number(0.2, 0.4), body.mass * number(0.2, 0.4),
+                             body.mass * number(0.2, 0.4)};
+    body.inertia = {{{moments.x, 0, 0}, {0, moments.y, 0}, {0, 0, moments.z}}};
+    body.inverse_inertia = inverse(body.inertia);
+    if (below(4) == 0) body.material.restitution = 0.8;
+    if (below(4) == 0) body.material.friction = number(0, 1);
+    if (below(4) == 0) body.material.rolling_resistance = number(0, 0.1);
+    states[i].position = any(5);
+    states[i].orientation = rotation_by(any(2));
+    states[i].velocity = any(2), states[i].angular_velocity = any(2);
+    pulls[i] = {{0, 0, -9.81}, {}};
+    if (below(8) == 0) pulls[i].angular = any(1), pulls[i].turning = norm(pulls[i].angular);
+  }
+
+  void touch(std::uint32_t a, std::uint32_t b, std::uint32_t count) {
+    const auto first = static_cast<std::uint32_t>(contacts.size());
+    Vector3 normal = normalized(any(1) + Vector3{0, 0, 1.5});
+    const Vector3 middle = 0.5 * (states[a].position + states[b].position);
+    for (std::uint32_t k = 0; k < count; ++k) {
+      if (below(3) == 0) normal = normalized(any(1) + Vector3{0, 0, 0.1});
+      contacts.push_back({a, b, middle + any(0.5), normal, number(-2e-3, 6e-3), 0});
+      if (below(4) == 0) contacts.back().time = number(0, dt);
+      ContactImpulse& impulse = impulses.emplace_back();
+      if (below(3) == 0) continue;
+      impulse.normal = number(0, 1);
+      impulse.tangential = 0.3 * cross(normal, any(1));
+      impulse.turning = 0.01 * any(1);
+    }
+    const bool moves = bodies[a].motion == Motion::moving || bodies[b].motion == Motion::moving;
+    if (moves) pairs.push_back({a, b, first, count});
+  }
+
+  std::mt19937 random_;
+};
+
+/// What a step of a heap gives.
+struct HeapResult {
+  std::vector<BodyState> states;
+  std::vector<ContactImpulse> impulses, done;
+};
+
+/// A step of the heap as the CPU makes it.
+inline HeapResult soft_solution(const RandomHeap& heap, std::uint32_t thread_count = 1) {
+  Threads threads(thread_count);
+  std::vector<ContactImpulse> done = heap.impulses;
+  HeapResult out = {heap.states, heap.impulses, {}};
+  const Islands islands = find_islands(heap.bodies, heap.contacts);
+  make_step_solver(heap.options)
+      ->step({heap.step(), islands, 0, false, threads, {}, {}, done}, out.states, out.impulses);
+  out.done = std::move(done);
+  return out;
+}
+
+}  // namespace tandem::dynamics

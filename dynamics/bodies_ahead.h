@@ -36,6 +36,18 @@ struct BodiesAhead {
   TANDEM_HD double fall(const ObjectPair& pair) const { return std::max(fall(pair.a), fall(pair.b)); }
   TANDEM_HD double fall(std::uint32_t body) const { return kFall * pulls[body].most() * dt * dt; }
 
+  /// Returns how fast points of a body move by its spin, at most.
+  TANDEM_HD double turning(std::uint32_t body) const {
+    return is_idle(body) ? 0 : bodies[body].radius * norm(states[body].angular_velocity);
+  }
+  TANDEM_HD double turning(const ObjectPair& pair) const { return turning(pair.a) + turning(pair.b); }
+
+  /// Returns the velocity of b's centre as seen from a's.
+  TANDEM_HD Vector3 approach(const ObjectPair& pair) const {
+    return (is_idle(pair.b) ? Vector3{} : states[pair.b].velocity) -
+           (is_idle(pair.a) ? Vector3{} : states[pair.a].velocity);
+  }
+
   /// A length in which contacts are told well.
   TANDEM_HD double overlap() const { return 0.5 * slop; }
 

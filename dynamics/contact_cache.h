@@ -4,20 +4,10 @@
 #include <utility>
 #include <vector>
 
-#include "dynamics/bodies_ahead.h"
+#include "dynamics/remembered_contacts.h"
 #include "tandem/kernels/object_pair.h"
 
 namespace tandem::dynamics {
-
-/// A contact of a step and its impulse, as the next step needs them.
-struct CachedContact {
-  ObjectPair pair;
-  std::uint64_t feature;
-  ContactAnchor anchor;
-  Vector3 normal_in_a;        ///< the normal, in a's frame
-  std::uint32_t quiet_steps;  ///< since it was found or last pushed
-  ContactImpulse impulse;     ///< of the last step
-};
 
 /// Remembers the contacts of a step and their impulses. Pairs that have not moved keep their contacts:
 /// contacts of meshes change with every triangle that comes or goes, and found anew in each step they would
@@ -65,14 +55,14 @@ class ContactCache {
   void restore(std::vector<CachedContact> entries);
 
  private:
-  // Makes the contacts of a pair that moved of those found and those just lost.
-  void renew(std::span<const CachedContact> old, std::span<const ContactPoint> found, const BodiesAhead& of,
-             double radius);
-  void add(const CachedContact& entry, const ContactPoint& contact);
+  // Makes room behind what there is, and takes what `make` says that it made there of a pair's contacts.
+  template <typename Make>
+  void add(std::size_t room, const Make& make);
 
   std::vector<CachedContact> entries_, before_;  // by ascending pair; before_: until update()
   std::vector<ContactPoint> contacts_;
   std::vector<std::uint32_t> place_;  // of each contact in entries_
+  std::vector<std::uint8_t> marks_;   // for one pair
   bool is_cold_ = true;
 };
 

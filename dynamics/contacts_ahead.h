@@ -2,8 +2,8 @@
 #include <span>
 #include <vector>
 
-#include "dynamics/bodies_ahead.h"
 #include "dynamics/contact_finder.h"
+#include "dynamics/pair_ahead.h"
 #include "tandem/kernels/distance_query.h"
 
 namespace tandem::dynamics {
@@ -76,40 +76,14 @@ class ContactsAhead {
     double reach = 0;  ///< how far apart they may be and meet within the step
     bool slow = false;
   };
-  /// A pair whose bodies are nearer than its reach, by place in apart_.
-  struct Asked {
-    std::size_t place;
-    ObjectDistance distance;
-  };
-  /// Tells how far bodies have gone from one state to another.
-  class Ways {
-   public:
-    void find(std::span<const BodyProperties> bodies, std::span<const BodyState> from,
-              std::span<const BodyState> to);
-
-    /// Returns how far points of one body have moved as seen from the other, at most.
-    double between(const ObjectPair& pair) const {
-      return norm(of_centre_[pair.b] - of_centre_[pair.a]) + about_it_[pair.a] + about_it_[pair.b];
-    }
-
-   private:
-    std::vector<Vector3> of_centre_;
-    std::vector<double> about_it_;  // the most that a point has
-  };
-  struct Approach {
-    ObjectPair pair;
-    double gap;  ///< of the nearest points
-    bool is_nearest;
-    Vector3 way;  ///< of b, until it overlaps a
-  };
   void place(const BodiesAhead& of);
   void follow(const BodiesAhead& of);
-  bool is_still(std::uint32_t body) const { return motion_[body] == Motion::fixed; }
-  double turning_of(const ObjectPair& pair) const { return turning_[pair.a] + turning_[pair.b]; }
-  Vector3 approach_of(const ObjectPair& pair, std::span<const BodyState> states) const;
-  double farthest(const BodiesAhead& of) const;
-  void find_distances(std::span<const ContactPoint> found, std::span<const ObjectPair> kept, double overlap);
-  void find_approaches(const BodiesAhead& of);
+  static double farthest(const BodiesAhead& of);
+  double between(const ObjectPair& pair) const { return way_between(ways_[pair.a], ways_[pair.b]); }
+  void find_ways(std::span<const BodyProperties> bodies, std::span<const BodyState> from,
+                 std::span<const BodyState> to);
+  void find_approaches(std::span<const ContactPoint> found, std::span<const ObjectPair> kept,
+                       const BodiesAhead& of);
   void find_points(const BodiesAhead& of);
   void find_surprised(std::span<const ContactPoint> known, const BodiesAhead& start,
                       std::span<const BodyState> end);
@@ -127,14 +101,14 @@ class ContactsAhead {
 
   FinderReport report_;
   std::vector<BodyState> before_;  // of the last call
-  Ways ways_;
+  std::vector<BodyWay> ways_;
   std::vector<Apart> apart_, now_apart_;
   std::vector<ObjectPair> slow_, fast_;
   std::vector<Motion> motion_;
-  std::vector<double> turning_;  // how fast points of each body move by its spin, at most
   std::vector<Instance> instances_;
   std::vector<ObjectPair> pairs_, moved_pairs_, of_middle_, missed_;
-  std::vector<Asked> asked_;
+  std::vector<std::uint32_t> places_;  // of pairs_ in apart_
+  std::vector<double> reaches_;
   std::vector<Approach> approaches_;
   std::vector<ContactPoint> points_, in_middle_;
 };

@@ -10,11 +10,6 @@ namespace {
 
 using rigid_body_detail::turn_into_world;
 
-// It is false of NaN.
-bool is_within(const Vector3& x, double most) {
-  return std::fabs(x.x) <= most && std::fabs(x.y) <= most && std::fabs(x.z) <= most;
-}
-
 }  // namespace
 
 BodyProperties body_properties(std::uint32_t shape, const MassProperties& mesh, double density) {
@@ -45,11 +40,6 @@ double default_slop(std::span<const AssetView> shapes, std::span<const BodyPrope
       least = std::min(least, norm(vector_of(header.upper) - vector_of(header.lower)));
   }
   return kOfDiagonal * (std::isfinite(least) ? least : kDiagonal);
-}
-
-bool is_usable(const BodyState& state) {
-  return is_within(state.position, kLargestWorldCoordinate) && std::isfinite(state.orientation.w) &&
-         is_within(state.velocity, kFastest) && is_within(state.angular_velocity, kFastest);
 }
 
 bool is_usable_mass(double mass) {

@@ -7,6 +7,7 @@
 #include "dynamics/mass_properties.h"
 #include "tandem/dynamics/material.h"
 #include "tandem/kernels/scene.h"
+#include "tandem/kernels/world_box.h"
 
 namespace tandem::dynamics {
 
@@ -79,7 +80,15 @@ inline constexpr double kFastest = 1e10;
 
 /// Returns whether a step can start from a state: all numbers are finite, places are such as queries take,
 /// and nothing is faster than kFastest.
-bool is_usable(const BodyState& state);
+TANDEM_HD inline bool is_usable(const BodyState& state) {
+  // It is false of NaN.
+  const auto is_within = [](const Vector3& x, double most) {
+    return std::fabs(x.x) <= most && std::fabs(x.y) <= most && std::fabs(x.z) <= most;
+  };
+  return is_within(state.position, kLargestWorldCoordinate) &&
+         std::fabs(state.orientation.w) <= 1.7976931348623157e308 && is_within(state.velocity, kFastest) &&
+         is_within(state.angular_velocity, kFastest);
+}
 
 /// Returns whether a step can move a body of this mass, in kg: products of three of its moments of inertia
 /// are numbers.

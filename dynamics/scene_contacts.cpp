@@ -39,7 +39,9 @@ std::span<const ObjectPair> ContactFinder::find_moved(Scene& scene, MovedQuery& 
     if (moved.kept_rows()[i] != kNoIndex) kept_.push_back(pairs_[i]);
   }
   if (!keeping.near) return moved.rows();
-  std::ranges::set_union(moved.rows(), *keeping.near, std::back_inserter(asked_));
+  std::vector<ObjectPair> near;
+  std::ranges::set_difference(*keeping.near, kept_, std::back_inserter(near));
+  std::ranges::set_union(moved.rows(), near, std::back_inserter(asked_));
   return asked_;
 }
 

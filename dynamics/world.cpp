@@ -10,6 +10,7 @@
 #include "dynamics/lists_of_steps.h"
 #include "dynamics/scene_contacts.h"
 #include "dynamics/simulation.h"
+#include "dynamics/world_setup.h"
 #include "tandem/kernels/excluded_pairs.h"
 
 namespace tandem {
@@ -56,92 +57,8 @@ struct World::Parts {
 
 namespace {
 
-// Bodies that rest in a heap creep more slowly than this, in m/s.
-constexpr double kSleepSpeed = 0.03;
-
 void write(const Vector3& x, double (&out)[3]) {
   out[0] = x.x, out[1] = x.y, out[2] = x.z;
-}
-
-// It is false of NaN too.
-bool is_option(double x, double least, double most) {
-  return x >= least && x <= most;
-}
-
-constexpr double kMost = 1e6;  // of options that are numbers
-
-Status check(const WorldOptions& options) {
-  bool good = is_option(options.friction, 0, kMost) && is_option(options.restitution, 0, 1) &&
-              options.slop <= kMost && options.rolling_resistance <= kMost &&
-              is_option(options.substeps, 1, 10'000) && is_option(options.threads, 1, kMostSceneThreads);
-  for (const double g : options.gravity) good = good && is_option(g, -kMost, kMost);
-  return good ? Status::kOk : Status::kBadOption;
-}
-
-bool is_usable(const BodySettings& body) {
-  const Material& material = body.material;
-  return is_option(body.gravity_scale, -kMost, kMost) && material.friction <= kMost &&
-         material.restitution <= 1 && material.rolling_resistance <= kMost;
-}
-
-// Masses of assets, found once.
-class Masses {
- public:
-  explicit Masses(std::span<const AssetView> assets) : assets_(assets), of_(assets.size()) {}
-
-  Status find(const BodyDescription& from, BodyProperties& body) {
-    body.shape = from.asset;
-    body.motion = from.filter.motion == Motion::sleeping ? Motion::moving : from.filter.motion;
-    const AssetView& asset = assets_[from.asset];
-    if (body.motion == Motion::fixed) {
-      body.radius = radius_about({}, asset);
-      return Status::kOk;
-    }
-    if (!(from.density > 0 && std::isfinite(from.density))) return Status::kNoMass;
-    if (asset.level().topology == nullptr) return Status::kNoTopology;
-    if (!of_[from.asset]) {
-      try {
-        of_[from.asset] = body_properties(from.asset, mass_properties(asset).properties, 1);
-      } catch (const std::runtime_error&) {
-        return Status::kNoMass;
-      }
-      of_[from.asset]->radius = radius_about(of_[from.asset]->centre, asset);
-    }
-    const Motion motion = body.motion;
-    body = of_density(*of_[from.asset], from.density);
-    body.motion = motion;
-    return is_usable_mass(body.mass) ? Status::kOk : Status::kOutOfRange;
-  }
-
- private:
-  std::span<const AssetView> assets_;
-  std::vector<std::optional<BodyProperties>> of_;
-};
-
-SimulationOptions simulation_options(const WorldOptions& options, std::span<const AssetView> assets,
-                                     std::span<const BodyProperties> bodies) {
-  SimulationOptions to;
-  to.gravity = vector_of(options.gravity);
-  to.solver.friction = options.friction, to.solver.restitution = options.restitution;
-  to.solver.slop = options.slop >= 0 ? options.slop : default_slop(assets, bodies);
-  to.solver.rolling_resistance =
-      options.rolling_resistance >= 0 ? options.rolling_resistance : 16 * to.solver.slop;
-  to.solver.substeps = options.substeps;
-  to.sleep.enabled = options.sleeping;
-  to.sleep.speed = kSleepSpeed;
-  to.threads = options.threads;
-  return to;
-}
-
-Status check(const JointDescription& joint, std::span<const BodyProperties> bodies) {
-  bool moves = false;
-  for (const std::uint32_t body : {joint.a, joint.b}) {
-    if (body == kNoIndex) continue;
-    if (body >= bodies.size()) return Status::kUnknownInstance;
-    moves = moves || bodies[body].motion == Motion::moving;
-  }
-  if (!moves || joint.a == joint.b) return Status::kJoinsNothing;
-  return dynamics::check(joint);
 }
 
 }  // namespace
@@ -176,46 +93,24 @@ Status World::set_bodies(std::span<const BodyDescription> bodies, const WorldOpt
   if (parts_ == nullptr) return Status::kOutOfMemory;
   Parts& parts = *parts_;
   parts.clear();
-  if (check(options) != Status::kOk) return fail(Status::kBadOption);
   try {
-    Masses masses(parts.assets);
-    std::vector<BodyProperties> all(bodies.size());
-    std::vector<BodyState> states(bodies.size());
-    parts.group.clear(), parts.mask.clear(), parts.world.clear();
-    for (std::size_t i = 0; i < bodies.size(); ++i) {
-      const BodyDescription& from = bodies[i];
-      if (from.asset >= parts.assets.size()) return fail(Status::kUnknownAsset, i);
-      if (!is_rigid(from.pose)) return fail(Status::kPoseNotRigid, i);
-      const Status status = masses.find(from, all[i]);
-      if (status != Status::kOk) return fail(status, i);
-      all[i].material = from.material, all[i].gravity_scale = from.gravity_scale;
-      states[i] = state_of(all[i], from.pose);
-      if (all[i].motion != Motion::fixed) {
-        states[i].velocity = vector_of(from.velocity);
-        states[i].angular_velocity = vector_of(from.angular_velocity);
-      }
-      if (!is_usable(all[i]) || !is_usable(states[i])) return fail(Status::kOutOfRange, i);
-      parts.group.push_back(from.filter.group), parts.mask.push_back(from.filter.mask);
-      parts.world.push_back(from.filter.world);
-    }
-    std::vector<Joint> joined;
-    for (std::size_t i = 0; i < joints.size(); ++i) {
-      const JointDescription& from = joints[i];
-      const Status status = check(from, all);
-      if (status != Status::kOk) return fail(status, i);
-      joined.push_back(make_joint(from, states));
-    }
+    WorldSetup setup;
+    std::uint64_t blamed = 0;
+    const Status good = set_up(parts.assets, bodies, options, joints, setup, blamed);
+    if (good != Status::kOk) return fail(good, blamed);
+    parts.group = std::move(setup.group), parts.mask = std::move(setup.mask);
+    parts.world = std::move(setup.world);
     parts.excluded.assign(excluded.begin(), excluded.end());
-    const Status filters = parts.filter_pairs(joined);
+    const Status filters = parts.filter_pairs(setup.joints);
     if (filters != Status::kOk) return fail(filters);
-    const SimulationOptions to = simulation_options(options, parts.assets, all);
     SimulationParts of;
     of.contacts = make_scene_contacts(parts.assets, options.threads, &parts.filter);
     of.ahead = std::make_unique<ContactsAhead>(parts.assets, options.threads, &parts.filter);
     if (options.continuous)
       of.continuous = std::make_unique<ContinuousMotion>(parts.assets, options.threads, &parts.filter);
-    of.joints = std::move(joined);
-    parts.simulation = std::make_unique<Simulation>(std::move(all), std::move(states), std::move(of), to);
+    of.joints = std::move(setup.joints);
+    parts.simulation = std::make_unique<Simulation>(std::move(setup.properties), std::move(setup.states),
+                                                    std::move(of), setup.options);
     parts.placed = std::make_shared<char>();
     parts.read();
     parts.read_joints();

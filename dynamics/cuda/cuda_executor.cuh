@@ -6,6 +6,8 @@
 #include <cstdint>
 #include <cub/device/device_radix_sort.cuh>
 #include <cub/device/device_scan.cuh>
+#include <cub/device/device_select.cuh>
+#include <span>
 
 #include "dynamics/parallel/worker.h"
 #include "kernels/common/cub_code.cuh"
@@ -22,6 +24,29 @@ __global__ void __launch_bounds__(128)
     visit(i);
 }
 
+/// Visits as if there were one thing.
+template <typename Visit>
+struct VisitOnce {
+  Visit visit;
+  __device__ void operator()(std::uint32_t) const { visit(); }
+};
+
+/// Returns whether a number is below the count and is listed.
+template <typename IsIn>
+struct IsListed {
+  IsIn is_in;
+  const std::uint32_t* count;
+  __device__ bool operator()(std::uint32_t i) const { return (count == nullptr || i < *count) && is_in(i); }
+};
+
+/// Makes keys behind the last one the largest.
+struct FillBehind {
+  std::uint32_t* keys;
+  const std::uint32_t* count;
+  __device__ void operator()(std::uint32_t i) const {
+    if (i >= *count) keys[i] = 0xFFFFFFFFu;
+  }
+};
 template <typename Visit>
 __global__ void __launch_bounds__(128) visit_together(const __grid_constant__ Visit visit) {
   // The first teams are in different blocks, so that few teams have a processor each.
@@ -46,6 +71,7 @@ class CudaExecutor {
   class Array {
    public:
     Status reserve(std::uint64_t count) { return status_of(array_.grow(count)); }
+    Status grow(std::uint64_t count, std::uint64_t kept) { return status_of(array_.grow(count, kept)); }
     T* data() const { return array_.data(); }
     std::uint64_t room() const { return array_.room(); }
 
@@ -61,13 +87,19 @@ class CudaExecutor {
   /// Makes room for sums and sorting of so many. Waits for the GPU where memory grows.
   Status reserve(std::uint32_t most) {
     if (most <= room_) return Status::kOk;
-    std::size_t of_sums = 0, of_sort = 0;
+    std::size_t of_sums = 0, of_sort = 0, of_lists = 0;
     cudaError_t error = gpu::load_cub_code();
     if (error == cudaSuccess) error = sum(nullptr, of_sums, nullptr, nullptr, most, nullptr);
     cub::DoubleBuffer<std::uint32_t> keys(nullptr, nullptr), values(nullptr, nullptr);
     if (error == cudaSuccess)
       error = cub::DeviceRadixSort::SortPairs(nullptr, of_sort, keys, values, most, 0, 32, stream_);
-    if (error == cudaSuccess) error = scratch_.grow(std::max(of_sums, of_sort));
+    const auto is_in = IsListed<ValueOrZero>{};
+    if (error == cudaSuccess)
+      error = cub::DeviceSelect::If(nullptr, of_lists, thrust::counting_iterator<std::uint32_t>(0),
+                                    static_cast<std::uint32_t*>(nullptr),
+                                    static_cast<std::uint32_t*>(nullptr), most, is_in, stream_);
+    // The room for a list does not depend on what is listed, but for its alignment.
+    if (error == cudaSuccess) error = scratch_.grow(std::max({of_sums, of_sort, 2 * of_lists + 4096}));
     if (error == cudaSuccess) error = other_keys_.grow(most);
     if (error == cudaSuccess) error = other_values_.grow(most);
     if (error == cudaSuccess) room_ = most;
@@ -107,7 +139,33 @@ class CudaExecutor {
 
   template <typename Visit>
   void once(const Visit& visit) {
-    for_each(nullptr, 1, [visit] __device__(std::uint32_t) { visit(); });
+    for_each(nullptr, 1, VisitOnce<Visit>{visit});
+  }
+
+  template <typename IsIn>
+  void select(const IsIn& is_in, const std::uint32_t* count, std::uint32_t most, std::uint32_t* list,
+              std::uint32_t* listed) {
+    if (error_ != cudaSuccess) return;
+    std::size_t bytes = scratch_.room();
+    take(cub::DeviceSelect::If(scratch_.data(), bytes, thrust::counting_iterator<std::uint32_t>(0), list,
+                               listed, most, IsListed<IsIn>{is_in, count}, stream_));
+  }
+
+  template <typename T>
+  Status copy(std::span<const T> from, T* to) {
+    take(cudaMemcpyAsync(to, from.data(), from.size_bytes(), cudaMemcpyHostToDevice, stream_));
+    return wait();
+  }
+  template <typename T>
+  Status copy(const T* from, std::span<T> to) {
+    take(cudaMemcpyAsync(to.data(), from, to.size_bytes(), cudaMemcpyDeviceToHost, stream_));
+    return wait();
+  }
+
+  /// Waits until all that is queued is done.
+  Status wait() {
+    if (error_ == cudaSuccess) take(cudaStreamSynchronize(stream_));
+    return status();
   }
 
   void sum_before(const std::uint32_t* values, const std::uint32_t* count, std::uint32_t most,
@@ -119,9 +177,7 @@ class CudaExecutor {
   void sort_by_key(std::uint32_t* keys, std::uint32_t* values, const std::uint32_t* count, std::uint32_t most,
                    int bits) {
     if (most == 0) return;
-    for_each(nullptr, most, [=] __device__(std::uint32_t i) {
-      if (count != nullptr && i >= *count) keys[i] = 0xFFFFFFFFu;
-    });
+    if (count != nullptr) for_each(nullptr, most, FillBehind{keys, count});
     if (error_ != cudaSuccess) return;
     std::size_t bytes = scratch_.room();
     cub::DoubleBuffer<std::uint32_t> of_keys(keys, other_keys_.data()),

@@ -1,6 +1,5 @@
 #pragma once
 #include <atomic>
-#include <bit>
 #include <cstdint>
 
 #include "tandem/formats/platform.h"
@@ -9,22 +8,12 @@
 // depend on who comes first.
 namespace tandem::dynamics {
 
-TANDEM_HD inline void atomic_least(std::uint64_t& of, std::uint64_t x) {
+TANDEM_HD inline void atomic_least(std::uint32_t& of, std::uint32_t x) {
 #ifdef __CUDA_ARCH__
-  atomicMin(reinterpret_cast<unsigned long long*>(&of), static_cast<unsigned long long>(x));
+  atomicMin(&of, x);
 #else
-  std::atomic_ref<std::uint64_t> to(of);
-  for (std::uint64_t now = to.load(); x < now && !to.compare_exchange_weak(now, x);) {
-  }
-#endif
-}
-
-TANDEM_HD inline void atomic_most(std::uint64_t& of, std::uint64_t x) {
-#ifdef __CUDA_ARCH__
-  atomicMax(reinterpret_cast<unsigned long long*>(&of), static_cast<unsigned long long>(x));
-#else
-  std::atomic_ref<std::uint64_t> to(of);
-  for (std::uint64_t now = to.load(); x > now && !to.compare_exchange_weak(now, x);) {
+  std::atomic_ref<std::uint32_t> to(of);
+  for (std::uint32_t now = to.load(); x < now && !to.compare_exchange_weak(now, x);) {
   }
 #endif
 }
@@ -41,8 +30,9 @@ TANDEM_HD inline void atomic_most(std::uint32_t& of, std::uint32_t x) {
 
 /// Condition: both are not less than 0.
 TANDEM_HD inline void atomic_most(double& of, double x) {
-  // Such numbers are in the order of their bits.
 #ifdef __CUDA_ARCH__
+  // Such numbers are in the order of their bits. Most visits find a larger one already.
+  if (!(x > *static_cast<volatile double*>(&of))) return;
   atomicMax(reinterpret_cast<unsigned long long*>(&of),
             static_cast<unsigned long long>(__double_as_longlong(x)));
 #else
@@ -58,6 +48,14 @@ TANDEM_HD inline std::uint32_t atomic_add(std::uint32_t& of, std::uint32_t x) {
   return atomicAdd(&of, x);
 #else
   return std::atomic_ref<std::uint32_t>(of).fetch_add(x);
+#endif
+}
+
+TANDEM_HD inline void atomic_or(std::uint32_t& of, std::uint32_t bits) {
+#ifdef __CUDA_ARCH__
+  if ((*static_cast<volatile std::uint32_t*>(&of) & bits) != bits) atomicOr(&of, bits);
+#else
+  std::atomic_ref<std::uint32_t>(of).fetch_or(bits);
 #endif
 }
 

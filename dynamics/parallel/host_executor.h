@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <numeric>
+#include <span>
 #include <vector>
 
 #include "dynamics/parallel/worker.h"
@@ -23,6 +24,11 @@ class HostExecutor {
    public:
     Status reserve(std::uint64_t count) {
       if (count > elements_.size()) elements_.clear(), elements_.resize(count);
+      return Status::kOk;
+    }
+    /// The first `kept` elements stay.
+    Status grow(std::uint64_t count, std::uint64_t) {
+      if (count > elements_.size()) elements_.resize(count);
       return Status::kOk;
     }
     T* data() const { return const_cast<T*>(elements_.data()); }
@@ -65,6 +71,17 @@ class HostExecutor {
     visit();
   }
 
+  /// Lists the numbers below the count of which is_in() is true, ascending, and says how many they are.
+  template <typename IsIn>
+  void select(const IsIn& is_in, const std::uint32_t* count, std::uint32_t most, std::uint32_t* list,
+              std::uint32_t* listed) {
+    std::uint32_t taken = 0;
+    for (std::uint32_t i = 0; i < below(count, most); ++i) {
+      if (is_in(i)) list[taken++] = i;
+    }
+    *listed = taken;
+  }
+
   /// sums[i] becomes the sum of all values before i, of i from 0 to the count, up to which there must be
   /// room.
   void sum_before(const std::uint32_t* values, const std::uint32_t* count, std::uint32_t most,
@@ -86,6 +103,18 @@ class HostExecutor {
     std::ranges::stable_sort(order, {}, [&](std::uint32_t i) { return keys[i]; });
     const std::vector<std::uint32_t> old_keys(keys, keys + order.size()), old(values, values + order.size());
     for (std::size_t i = 0; i < order.size(); ++i) keys[i] = old_keys[order[i]], values[i] = old[order[i]];
+  }
+
+  /// Copies to the executor's memory, and from it when all that was called for is done.
+  template <typename T>
+  Status copy(std::span<const T> from, T* to) {
+    std::ranges::copy(from, to);
+    return Status::kOk;
+  }
+  template <typename T>
+  Status copy(const T* from, std::span<T> to) {
+    std::copy_n(from, to.size(), to.begin());
+    return Status::kOk;
   }
 
   Status status() const { return Status::kOk; }

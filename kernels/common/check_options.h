@@ -11,7 +11,7 @@
 namespace tandem {
 
 /// A reach of object pairs or of distances; it may be infinite. Result: kOk or kBadReach.
-inline Status check_reach(double reach) {
+TANDEM_HD inline Status check_reach(double reach) {
   return reach >= 0 ? Status::kOk : Status::kBadReach;
 }
 

@@ -98,7 +98,8 @@ struct DistanceArgs {
   GpuInstances instances;
   GpuPairs given;
   DistanceTolerance tolerance;
-  double beyond_reach;  ///< the least number that is; infinite without a reach
+  double reach;
+  const double* reach_of_pair;  ///< or null
   const ObjectDistance* former;
   GpuDistanceCapacity capacity;
   DistanceState* state;
@@ -147,15 +148,24 @@ __device__ inline DistanceFrame frame_of(const DistanceRecord& record) {
   return frame;
 }
 
+__device__ inline double reach_of(const DistanceArgs& args, std::uint32_t pair) {
+  return args.reach_of_pair != nullptr ? args.reach_of_pair[pair] : args.reach;
+}
+
+/// Returns the least number that is beyond the reach of a pair; infinite without a reach.
+__device__ inline double beyond_reach(const DistanceArgs& args, std::uint32_t pair) {
+  return std::nextafter(reach_of(args, pair), HUGE_VAL);
+}
+
 /// Returns the upper bound of the distance. Before anything is known, what is at least so far is beyond
 /// reach.
-__device__ inline double upper_in(const DistanceArgs& args, const NearState& state) {
-  return fmin(as_double(state.upper), args.beyond_reach);
+__device__ inline double upper_in(const NearState& state, double beyond) {
+  return fmin(as_double(state.upper), beyond);
 }
 
 /// nearness() of the CPU.
-__device__ inline double nearness(const DistanceArgs& args, double upper) {
-  return upper < args.beyond_reach ? nearness_below(args.tolerance, upper) : upper;
+__device__ inline double nearness(const DistanceArgs& args, double upper, double beyond) {
+  return upper < beyond ? nearness_below(args.tolerance, upper) : upper;
 }
 
 /// Triangles of a pair, in world coordinates.

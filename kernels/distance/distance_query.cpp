@@ -42,6 +42,7 @@ struct DistanceQuery::State : Allocated {
   DistanceCounters* counters = nullptr;
 
   bool is_spread(const ObjectPair& pair) const;
+  double reach_of(std::size_t pair) const;
   NearestTask task_of(const ObjectPair& pair) const;
   NearestTriangles former_of(const ObjectPair& pair) const;
   void find_one(std::size_t pair, DistanceSearch& search);
@@ -54,6 +55,10 @@ bool DistanceQuery::State::is_spread(const ObjectPair& pair) const {
   return pair.a != pair.b && std::uint64_t{scene->bodies[pair.a].tree.triangle_count} +
                                      scene->bodies[pair.b].tree.triangle_count >=
                                  kSpreadFrom;
+}
+
+double DistanceQuery::State::reach_of(std::size_t pair) const {
+  return options.reach_of_pair.empty() ? options.reach : options.reach_of_pair[pair];
 }
 
 NearestTask DistanceQuery::State::task_of(const ObjectPair& pair) const {
@@ -72,12 +77,13 @@ NearestTriangles DistanceQuery::State::former_of(const ObjectPair& pair) const {
 
 void DistanceQuery::State::find_one(std::size_t pair, DistanceSearch& search) {
   const NearestTask task = task_of(pairs[pair]);
+  const double reach = reach_of(pair);
   if (pairs[pair].a == pairs[pair].b) {
-    search.found.reset(options.reach);
+    search.found.reset(reach);
     settle(task, 0, 0, search.found);
-    distances[pair] = search.finish(task, options.reach);
+    distances[pair] = search.finish(task, reach);
   } else {
-    distances[pair] = search.find(task, options.reach, former_of(pairs[pair]), nearest_phase);
+    distances[pair] = search.find(task, reach, former_of(pairs[pair]), nearest_phase);
   }
 }
 
@@ -112,7 +118,7 @@ bool DistanceQuery::State::find_spread(std::size_t pair) {
   whole.counters = {};
   whole.enough_memory = true;
   const NearestTask task = task_of(pairs[pair]);
-  spread.begin(task, options.reach, former_of(pairs[pair]));
+  spread.begin(task, reach_of(pair), former_of(pairs[pair]));
   whole.most_visits = kVisitsAlone;
   const BoundedBlockPair roots = {0, 0, 0, kAllNodePairs};
   phase_of(task, nearest_phase)(task, &roots, 1, whole);
@@ -123,7 +129,7 @@ bool DistanceQuery::State::find_spread(std::size_t pair) {
       if (!whole.enough_memory || !walk_round(task, first, spread)) return false;
     }
   }
-  distances[pair] = spread.finish(task, options.reach);
+  distances[pair] = spread.finish(task, reach_of(pair));
   add_to(*counters, whole.counters);
   return whole.enough_memory;
 }
@@ -152,11 +158,20 @@ Status DistanceQuery::State::find_all() {
   return Status::kOk;
 }
 
+Status DistanceQuery::check_reaches(SceneState& scene, std::span<const double> of_pair) const {
+  if (!of_pair.empty() && of_pair.size() != pairs_.size()) return scene.fail(Status::kBadOption, 0);
+  for (std::size_t i = 0; i < of_pair.size(); ++i) {
+    if (const Status status = check_reach(of_pair[i]); status != Status::kOk) return scene.fail(status, i);
+  }
+  return Status::kOk;
+}
+
 Status DistanceQuery::answer(SceneState& scene, const std::span<const ObjectPair>* given,
                              const DistanceOptions& options) {
   Status status = check_distance_options(options.tolerance, options.reach);
   if (status != Status::kOk) return scene.fail(status, 0);
   status = scene.take_or_find_pairs(given, options.reach, false, pairs_);
+  if (status == Status::kOk) status = check_reaches(scene, options.reach_of_pair);
   if (status != Status::kOk) return status;
   if (scene.device != nullptr) return scene.ask_device(options, found());
   State* const state = state_.provide();

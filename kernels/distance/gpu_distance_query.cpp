@@ -1,7 +1,6 @@
 #include "tandem/kernels/gpu_distance_query.h"
 
 #include <algorithm>
-#include <cmath>
 #include <cstddef>
 
 #include "kernels/common/check_options.h"
@@ -89,7 +88,8 @@ struct HostOf<GpuDistanceReport> : GpuHost<DistanceState, GpuDistanceReport> {
     assets.fill(args);
     args.given = pairs;
     args.tolerance = options.tolerance;
-    args.beyond_reach = std::nextafter(options.reach, INFINITY);
+    args.reach = options.reach;
+    args.reach_of_pair = options.reach_of_pair;
     args.former = options.former;
     args.capacity = capacity();
     args.walked = {walked.data(), &s->walked, of_pairs.count()};

@@ -1,5 +1,6 @@
 #include <algorithm>
 
+#include "kernels/common/check_options.h"
 #include "kernels/common/traversal.h"
 #include "kernels/distance/distance_data.h"
 
@@ -48,9 +49,9 @@ __device__ bool has_near_roots(const DistanceRecord& record, const DistanceFrame
 }
 
 /// Returns the state in which nothing is known.
-__device__ NearState fresh_state(const DistanceArgs& args) {
+__device__ NearState fresh_state(double beyond) {
   NearState state = {};
-  state.near = state.open_near = args.beyond_reach;
+  state.near = state.open_near = beyond;
   state.upper = state.floor = state.first_upper = state.best = as_bits(INFINITY);
   state.seed = state.first = state.best_of_rest = kNoTriangles;
   return state;
@@ -67,9 +68,11 @@ __device__ double farthest_of(const Pose& pose_a, const TreeExtent& a, const Pos
 
 /// Result: whether the pair is to be walked.
 __device__ bool prepare_pair(const DistanceArgs& args, std::uint32_t index) {
-  NearState state = fresh_state(args);
+  const double beyond = beyond_reach(args, index);
+  NearState state = fresh_state(beyond);
   const ObjectPair pair = args.given.pairs[index];
-  const Status status = check_pair(pair, args.instances.count);
+  Status status = check_pair(pair, args.instances.count);
+  if (status == Status::kOk) status = check_reach(reach_of(args, index));
   if (status != Status::kOk) report_error(args, Subject::pair, index, status);
   // Assets that there are not are reported with the instance.
   bool walked = status == Status::kOk && args.instances.asset[pair.a] < args.asset_count &&
@@ -83,7 +86,7 @@ __device__ bool prepare_pair(const DistanceArgs& args, std::uint32_t index) {
     const DistanceRecord record = make_record(pair, a.tree, b.tree, in_frame, frame);
     args.records[index] = record;
     const double farthest = farthest_of(pose_a, a.extent, pose_b, b.extent);
-    state.limit = state.open_limit = in_frame ? distance::limit_of(frame, args.beyond_reach) : INFINITY;
+    state.limit = state.open_limit = in_frame ? distance::limit_of(frame, beyond) : INFINITY;
     state.top = fminf(state.limit, static_cast<float>(in_frame ? farthest * farthest : farthest));
     if (!in_frame) atomicAdd(&args.state->world_pairs, Counter{1});
     if (pair.a == pair.b) state.first = triangles_as_number(0, 0);

@@ -34,10 +34,9 @@ __device__ void write(const TriangleDistance& found, std::uint32_t a, std::uint3
 }
 
 /// The triangles of a pair that are settled first, kNoTriangles where all are beyond reach.
-__device__ Counter first_of(const DistanceArgs& args, const NearState& state) {
+__device__ Counter first_of(const NearState& state, double beyond) {
   if (state.first != kNoTriangles) return state.first;
-  return as_double(state.upper) < args.beyond_reach || args.beyond_reach == INFINITY ? state.seed
-                                                                                     : kNoTriangles;
+  return as_double(state.upper) < beyond || beyond == INFINITY ? state.seed : kNoTriangles;
 }
 
 /// Settles the first triangles of each pair.
@@ -47,7 +46,7 @@ __global__ void __launch_bounds__(kThreads) settle_first(const __grid_constant__
   const std::uint32_t pairs = pair_count(args);
   for (std::uint32_t i = thread_number(); i < pairs; i += thread_count()) {
     NearState& state = args.near_states[i];
-    const Counter first = state.first = first_of(args, state);
+    const Counter first = state.first = first_of(state, beyond_reach(args, i));
     if (first == kNoTriangles) continue;
     const auto a = static_cast<std::uint32_t>(first >> 32), b = static_cast<std::uint32_t>(first);
     const TriangleDistance found = settle<kWords>(args, posed_pair(args, i, a, b));
@@ -64,7 +63,8 @@ __global__ void __launch_bounds__(kThreads) settle_first(const __grid_constant__
 __device__ bool is_left(const DistanceArgs& args, const TrianglePairEntry& entry, const FrameBounds& bounds) {
   NearState& state = args.near_states[entry.pair];
   if (state.best == 0 || triangles_as_number(entry.a, entry.b) == state.first) return false;
-  const double upper = upper_in(args, state), near = nearness(args, upper);
+  const double beyond = beyond_reach(args, entry.pair), upper = upper_in(state, beyond),
+               near = nearness(args, upper, beyond);
   double lower = static_cast<double>(bounds.lower) * args.records[entry.pair].least_in_world;
   if (lower < near && state.first != kNoTriangles) {
     const ObjectDistance& first = args.distances[entry.pair];
@@ -124,13 +124,14 @@ __device__ bool is_first_best(const DistanceArgs& args, std::uint32_t pair) {
 __device__ void finish_row(const DistanceArgs& args, std::uint32_t pair, bool found) {
   const NearState& state = args.near_states[pair];
   ObjectDistance& out = args.distances[pair];
-  const double upper = fmin(upper_in(args, state), as_double(state.best));
+  const double beyond = beyond_reach(args, pair),
+               upper = fmin(upper_in(state, beyond), as_double(state.best));
   out.lower = fmin(as_double(state.floor), upper);
-  if (!found || out.lower >= args.beyond_reach) {
+  if (!found || out.lower >= beyond) {
     out = {out.lower, INFINITY, {}, {}, kNoIndex, kNoIndex, kNoIndex, kNoIndex};
     return;
   }
-  if (upper < args.beyond_reach) out.upper = fmin(out.upper, upper);
+  if (upper < beyond) out.upper = fmin(out.upper, upper);
   const PairRecord& record = args.records[pair].pair;
   out.face_a = record.triangles_a[out.triangle_a].source_face();
   out.face_b = record.triangles_b[out.triangle_b].source_face();

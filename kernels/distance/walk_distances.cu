@@ -292,8 +292,8 @@ __global__ void __launch_bounds__(kThreads) choose_nearest(const __grid_constant
 __device__ bool aim_at_nearest(const DistanceArgs& args, std::uint32_t pair) {
   const DistanceRecord& record = args.records[pair];
   NearState& state = args.near_states[pair];
-  const double upper = upper_in(args, state);
-  state.near = nearness(args, upper);
+  const double beyond = beyond_reach(args, pair), upper = upper_in(state, beyond);
+  state.near = nearness(args, upper, beyond);
   state.open_near = upper;
   if (record.pair.in_frame != 0) {
     const DistanceFrame frame = frame_of(record);

@@ -129,9 +129,11 @@ class Gpu final : public SceneDevice {
 
   Status find(SceneState& scene, const DistanceOptions& options,
               const DeviceAnswer<ObjectDistance, DistanceCounters>& found) override {
-    const GpuDistanceOptions on_gpu = {options.tolerance, options.reach};
+    GpuDistanceOptions on_gpu = {options.tolerance, options.reach};
     return ask<GpuDistanceQuery>(scene, found, Status::kOk, [&](auto& query) {
-      Status status = query.find_distances(instances_, pairs_, on_gpu, kStream);
+      Status status = upload(options.reach_of_pair, reach_of_pair_);
+      if (!options.reach_of_pair.empty()) on_gpu.reach_of_pair = reach_of_pair_.data();
+      if (status == Status::kOk) status = query.find_distances(instances_, pairs_, on_gpu, kStream);
       if (status == Status::kOk) status = copy(query.distances(), found.pairs.size(), found.rows);
       return status;
     });
@@ -505,7 +507,7 @@ class Gpu final : public SceneDevice {
   Buffer<RigidMotion> motions_;
   GpuArray<std::uint32_t> asset_on_gpu_, group_on_gpu_, mask_on_gpu_, world_on_gpu_, pair_count_;
   GpuArray<std::uint8_t> is_there_on_gpu_;
-  GpuArray<double> points_on_gpu_, directions_on_gpu_;
+  GpuArray<double> points_on_gpu_, directions_on_gpu_, reach_of_pair_;
   GpuArray<Pose> pose_on_gpu_;
   GpuArray<Motion> motion_on_gpu_;
   GpuArray<RigidMotion> motions_on_gpu_;

@@ -6,12 +6,14 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "kernels/distance/distance_scenes.h"
 #include "kernels/distance/nearest_phase.h"
 #include "kernels/geometry/triangle_distance.h"
+#include "kernels/scene/scene_state.h"
 #include "kernels/solid_meshes.h"
 
 // Whole distance queries against all pairs of triangles, and every way to compute them against the others.
@@ -177,6 +179,34 @@ TEST_P(DistanceScenes, WhatIsBeyondReachIsToldAsSuch) {
   });
 }
 
+/// Expects the rows and counters of calls about one pair each.
+void expect_rows_of_single_calls(test::Asked<DistanceQuery>& query, const BodyScene& scene,
+                                 const std::vector<ObjectPair>& pairs, const std::vector<double>& reaches) {
+  ASSERT_EQ(query.find(scene.instances, pairs, {.reach_of_pair = reaches}), Status::kOk);
+  const std::vector<ObjectDistance> together = distances_of(query);
+  const DistanceCounters counters = query.counters();
+  DistanceCounters sum;
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    ASSERT_EQ(query.find(scene.instances, std::span(&pairs[i], 1), {.reach = reaches[i]}), Status::kOk);
+    EXPECT_TRUE(same_bytes(query.rows(), std::span(&together[i], 1))) << i << " within " << reaches[i];
+    add_to(sum, query.counters(),
+           {&DistanceCounters::object_pairs, &DistanceCounters::block_pairs, &DistanceCounters::by_float32,
+            &DistanceCounters::by_float64, &DistanceCounters::touching});
+  }
+  EXPECT_EQ(counters, sum);
+}
+
+TEST_P(DistanceScenes, ReachesOfPairsFindWhatSingleCallsFind) {
+  test::Asked<DistanceQuery> query;
+  for_scenes(test::trials(12, 10), [&](const BodyScene& scene, int seed) {
+    ASSERT_EQ(query.set_assets(scene.assets.views()), Status::kOk);
+    EXPECT_EQ(query.scene.set_threads(1 + static_cast<std::uint32_t>(seed % 3)), Status::kOk);
+    ASSERT_EQ(query.find(scene.instances), Status::kOk);
+    const std::vector<ObjectPair> pairs(query.pairs().begin(), query.pairs().end());
+    expect_rows_of_single_calls(query, scene, pairs, mixed_reaches(query.rows()));
+  });
+}
+
 TEST(DistanceQuery, ThreadsAndFormerNearestDoNotMatter) {
   const BodyScene scene = spread_out(crowd(3, 60), 4);
   test::Asked<DistanceQuery> query;
@@ -223,6 +253,7 @@ TEST(DistanceQuery, OneLargePairIsSpreadOverThreadsAlike) {
     ASSERT_EQ(query.find(scene.instances, pairs, {}), Status::kOk);
     EXPECT_EQ(distances_of(query), expected);
   }
+  expect_rows_of_single_calls(query, scene, pairs, {1, 2, 0});
   // The least over all triangles of the soup is that to the face at x = 0.5, found one by one.
   double least = HUGE_VAL;
   for (const PosedTriangle& triangle : posed_triangles(scene, 1)) {

@@ -2,8 +2,11 @@
 #include <gtest/gtest.h>
 
 #include <cstdio>
+#include <cstring>
+#include <span>
 
 #include "kernels/contact/contact_query_fixture.h"
+#include "tandem/kernels/distance_query.h"
 
 /// Scenes that tests of distances on the CPU and on a GPU share.
 namespace tandem {
@@ -18,6 +21,21 @@ inline BodyScene spread_out(BodyScene scene, double factor) {
     }
   }
   return scene;
+}
+
+inline bool same_bytes(std::span<const ObjectDistance> x, std::span<const ObjectDistance> y) {
+  return x.size() == y.size() && (x.empty() || std::memcmp(x.data(), y.data(), x.size_bytes()) == 0);
+}
+
+/// A reach for each pair: none, 0, less than its distance, as much, more, in turn.
+inline std::vector<double> mixed_reaches(std::span<const ObjectDistance> distances) {
+  std::vector<double> reaches;
+  for (std::size_t i = 0; i < distances.size(); ++i) {
+    const double upper = distances[i].upper;
+    const double choices[] = {INFINITY, 0, 0.5 * upper, upper, 2 * upper};
+    reaches.push_back(choices[i % 5]);
+  }
+  return reaches;
 }
 
 /// Calls check(scene, seed) for so many scenes of a family until it fails.

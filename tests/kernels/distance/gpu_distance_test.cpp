@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <cstring>
 
 #include "gpu/gpu_scene_fixture.h"
 #include "kernels/asked.h"
@@ -40,10 +39,6 @@ struct Found : test::AskedOnGpu<GpuDistanceQuery> {
   void run() { AskedOnGpu::run(GpuDistanceOptions{}); }
   Distances distances() const { return test::download(query.distances(), scene.pairs().capacity); }
 };
-
-bool same_bytes(const Distances& x, const Distances& y) {
-  return x.size() == y.size() && std::memcmp(x.data(), y.data(), x.size() * sizeof(ObjectDistance)) == 0;
-}
 
 void expect_overlap(const DistanceInterval& x, const DistanceInterval& y) {
   EXPECT_LE(x.lower, y.upper);
@@ -126,6 +121,26 @@ TEST_P(GpuDistanceScenes, AreTheSameBytesOnEveryRun) {
   });
 }
 
+/// The narrow walk is as wide for so many pairs as for one, so what is found of one does not depend on the
+/// others.
+TEST_P(GpuDistanceScenes, ReachesOfPairsFindWhatSingleCallsFind) {
+  constexpr std::size_t kAlike = 16;
+  for_scenes(test::trials(8, 10), [&](const BodyScene& scene, int) {
+    std::vector<ObjectPair> pairs = every_pair(scene, true);
+    if (pairs.size() > kAlike) pairs.resize(kAlike);
+    const std::vector<double> reaches = mixed_reaches(of_cpu(scene, pairs, {}));
+    const GpuArray<double> reach_of_pair = test::on_gpu(reaches);
+    Found found(scene, pairs);
+    ASSERT_EQ(found.find({.reach = 0, .reach_of_pair = reach_of_pair.data()}), Status::kOk);
+    const Distances together = found.distances();
+    for (std::size_t i = 0; i < pairs.size(); ++i) {
+      ASSERT_EQ(found.find({.reach = reaches[i]}), Status::kOk);
+      EXPECT_TRUE(same_bytes(std::span(&found.distances()[i], 1), std::span(&together[i], 1)))
+          << i << " within " << reaches[i];
+    }
+  });
+}
+
 TEST_F(GpuDistances, OfManyPairsAreCertified) {
   const BodyScene scene = spread_out(crowd(5, 300), 3);
   const std::vector<ObjectPair> pairs = every_pair(scene);
@@ -140,6 +155,13 @@ TEST_F(GpuDistances, OfManyPairsAreCertified) {
   const Distances again = found.distances();
   for (std::size_t i = 0; i < pairs.size() && !HasFailure(); ++i)
     expect_certified(scene, pairs[i], again[i], truth[i], {}, INFINITY);
+  // Each within a reach of its own.
+  const std::vector<double> reaches = mixed_reaches(truth);
+  const GpuArray<double> reach_of_pair = test::on_gpu(reaches);
+  ASSERT_EQ(found.find({.reach_of_pair = reach_of_pair.data()}), Status::kOk);
+  const Distances within = found.distances();
+  for (std::size_t i = 0; i < pairs.size() && !HasFailure(); ++i)
+    expect_certified(scene, pairs[i], within[i], truth[i], {}, reaches[i]);
 }
 
 TEST_F(GpuDistances, OfOneLargePair) {
@@ -204,6 +226,46 @@ TEST_F(GpuDistances, WhatDoesNotFitIsToldAndNothingIsLostOnTheRetry) {
   }
 }
 
+/// The number of pairs lies in GPU memory, and so do their reaches: a graph follows both.
+TEST_F(GpuDistances, AGraphFollowsTheNumberOfPairsAndTheirReaches) {
+  BodyScene scene = row_of_cubes(3);
+  for (int i = 0; i < 3; ++i) scene.instances[i].pose.translation[0] = 1.25 * i;
+  const std::vector<ObjectPair> pairs = {{0, 1}, {1, 2}, {0, 2}};  // 0.25, 0.25 and 1.5 apart
+  GpuArray<std::uint32_t> count = test::on_gpu(std::vector<std::uint32_t>{0});
+  GpuArray<double> reach_of_pair = test::on_gpu(std::vector<double>{0, 0, 0});
+  Found found(scene, pairs);
+  ASSERT_EQ(found.query.reserve({3, 1u << 12, 1u << 12, 1u << 10, 0}), Status::kOk);
+  test::GraphStream stream;
+  stream.capture([&] {
+    return found.query.enqueue(found.scene.instances(), {found.scene.pairs().pairs, count.data(), 3},
+                               {.reach_of_pair = reach_of_pair.data()}, stream.get());
+  });
+  const std::vector<std::vector<double>> calls = {{}, {0.2, 1, 1}, {1, 0.2}, {0.5}, {1, 1, 2}, {}};
+  for (const std::vector<double>& reaches : calls) {
+    const std::vector<std::uint32_t> number = {static_cast<std::uint32_t>(reaches.size())};
+    ASSERT_EQ(count.upload(number, stream.get()), cudaSuccess);
+    ASSERT_EQ(reach_of_pair.upload(reaches, stream.get()), cudaSuccess);
+    stream.launch();
+    const GpuDistanceReport& report = found.report();
+    EXPECT_EQ(report.status, Status::kOk);
+    EXPECT_EQ(report.complete, 1u);
+    EXPECT_EQ(report.needed.pairs, number[0]);
+    EXPECT_EQ(report.counters.object_pairs, number[0]);
+    if (reaches.empty()) {
+      const GpuDistanceCapacity& needed = report.needed;
+      EXPECT_EQ(needed.block_pairs + needed.triangle_pairs + needed.settled, 0u);
+    }
+    const Distances distances = found.distances();
+    for (std::size_t i = 0; i < reaches.size(); ++i) {
+      const double gap = i == 2 ? 1.5 : 0.25;
+      if (reaches[i] > gap)
+        expect_overlap({distances[i].lower, distances[i].upper}, {gap, gap});
+      else
+        EXPECT_TRUE(distances[i].triangle_a == kNoIndex && distances[i].lower >= reaches[i]) << i;
+    }
+  }
+}
+
 TEST_F(GpuDistances, AGraphFollowsTheBodies) {
   BodyScene scene = row_of_cubes(2);
   const std::vector<ObjectPair> pairs = {{1, 0}};
@@ -252,6 +314,12 @@ TEST_F(GpuDistances, ErrorsAreNamed) {
   EXPECT_EQ(found.find({.reach = -1}), Status::kBadReach);
   EXPECT_EQ(found.find({.tolerance = {0, NAN}}), Status::kBadTolerance);
   EXPECT_EQ(found.find(), Status::kOk);
+  Found of_three(scene, {{0, 1}, {2, 2}, {1, 2}});
+  for (const double bad : {-1.0, static_cast<double>(NAN)}) {
+    const GpuArray<double> reach_of_pair = test::on_gpu(std::vector<double>{1, bad, bad});
+    EXPECT_EQ(of_three.find({.reach_of_pair = reach_of_pair.data()}), Status::kBadReach);
+    EXPECT_EQ(of_three.report().where, 1u);
+  }
   test::expect_needed<GpuDistanceQuery>(scene, Contents::exact_queries, Status::kNoAxisAlignedBlocks);
 }
 

@@ -630,6 +630,37 @@ TYPED_TEST_P(SceneOn, TellsGapsApartThatFloat32Lacks) {
   }
 }
 
+TYPED_TEST_P(SceneOn, TakesAReachForEachPair) {
+  BodyScene cubes = row_of_cubes(3);
+  for (int i = 0; i < 3; ++i) cubes.instances[i].pose.translation[0] = 1.25 * i;
+  TypeParam scene;
+  ASSERT_EQ(scene.set_assets(cubes.assets.views()), Status::kOk);
+  ASSERT_EQ(scene.place(cubes.instances), Status::kOk);
+  DistanceQuery query;
+  std::vector<double> reaches = {0.3, 1, 0.2};
+  ASSERT_EQ(query.find(scene, {.reach_of_pair = reaches}), Status::kOk);
+  ASSERT_EQ(query.rows().size(), 3u);  // of the distances 0.25, 1.5, 0.25
+  EXPECT_NEAR(query.rows()[0].upper, 0.25, 1e-6);
+  for (const std::size_t i : {1, 2}) {
+    EXPECT_EQ(query.rows()[i].triangle_a, kNoIndex);
+    EXPECT_EQ(query.rows()[i].upper, INFINITY);
+    EXPECT_GE(query.rows()[i].lower, reaches[i]);
+  }
+  // The scene finds pairs by the reach of all, which pairs with a reach of their own do not have.
+  const std::vector<double> far = {9, 9};
+  ASSERT_EQ(query.find(scene, {.reach = 1, .reach_of_pair = far}), Status::kOk);
+  EXPECT_EQ(query.rows().size(), 2u);
+  EXPECT_EQ(query.find(scene, {.reach_of_pair = far}), Status::kBadOption);
+  EXPECT_TRUE(query.rows().empty());
+  for (const double bad : {-1.0, static_cast<double>(NAN)}) {
+    reaches[2] = bad;
+    EXPECT_EQ(query.find(scene, {.reach_of_pair = reaches}), Status::kBadReach);
+    EXPECT_EQ(scene.where(), 2u);
+  }
+  EXPECT_EQ(query.find(scene, std::span<const ObjectPair>(), {.reach_of_pair = reaches}), Status::kBadOption);
+  EXPECT_EQ(query.find(scene, std::span<const ObjectPair>(), {.reach_of_pair = {}}), Status::kOk);
+}
+
 TYPED_TEST_P(SceneOn, RefusesPositionsAndStaysAsItIs) {
   RandomPoses random(33);
   const BendingBodies bodies(random);
@@ -670,6 +701,6 @@ REGISTER_TYPED_TEST_SUITE_P(SceneOn, FindsThePairsOfItsBodiesWhateverChanged, Fi
                             AnswersManyQuestionsAboutTheSameBodies, AnswersOfNoBodiesAreEmpty,
                             AnswersQuestionsAboutBodiesThatBend, FindsContactsOfBodiesThatBendWildly,
                             DecidesOnPositionsInFloat64, TellsGapsApartThatFloat32Lacks,
-                            RefusesPositionsAndStaysAsItIs);
+                            TakesAReachForEachPair, RefusesPositionsAndStaysAsItIs);
 
 }  // namespace tandem

@@ -330,8 +330,11 @@ class SweepSolver final : public StepSolver {
         states[body].velocity += dt * input.pulls[body].linear;
         states[body].angular_velocity += dt * input.pulls[body].angular;
       }
-      solve({input.bodies, followed.contacts(), input.islands, dt, input.pulls,
-             input.number * options.substeps + i, input.is_cold, input.threads},
+      solve({{input.bodies, followed.contacts(), dt, input.pulls},
+             input.islands,
+             input.number * options.substeps + i,
+             input.is_cold,
+             input.threads},
             options, states, impulses);
       for (std::size_t body = 0; body < states.size(); ++body) {
         advance(input.bodies[body], states[body], corrections_[body].velocity, corrections_[body].spin, dt);

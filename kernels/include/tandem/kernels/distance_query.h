@@ -28,6 +28,8 @@ struct DistanceOptions {
   DistanceTolerance tolerance = {};
   /// Pairs that are surely farther apart than this have no nearest points: lower >= reach, upper is infinite.
   double reach = std::numeric_limits<double>::infinity();
+  /// One for each pair instead, or none, else kBadOption. The scene finds pairs by `reach`.
+  std::span<const double> reach_of_pair = {};
   /// The nearest triangles of a former step, with which the search of a pair begins, by ascending a, then b.
   /// Pairs and triangles that do not exist are passed over. Results are as certified as without, and come
   /// sooner.
@@ -49,12 +51,14 @@ struct DistanceCounters {
 /// float64. The scene finds the object pairs whose world boxes are within reach of each other, or a little
 /// beyond. There is one row for each pair; an instance has distance 0 to itself. find() takes about 100 KB of
 /// the stack of each thread. Result of find(): as of ContactQuery; kBadTolerance or kBadReach where a
-/// tolerance or the reach is negative or NaN.
+/// tolerance or a reach is negative or NaN; kBadOption. Where a pair's own reach is bad, where() of the scene
+/// is the pair.
 class DistanceQuery : public PairQuestion<DistanceQuery, ObjectDistance, DistanceCounters, DistanceOptions> {
  private:
   friend PairQuestion;
   struct State;
   Status answer(SceneState& scene, const std::span<const ObjectPair>* given, const DistanceOptions& options);
+  Status check_reaches(SceneState& scene, std::span<const double> of_pair) const;
 
   Kept<State> state_;
 };

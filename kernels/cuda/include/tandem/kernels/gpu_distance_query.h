@@ -12,6 +12,9 @@ struct GpuDistanceOptions {
   DistanceTolerance tolerance = {};
   /// Pairs that are surely farther apart than this have no nearest points: lower >= reach, upper is infinite.
   double reach = std::numeric_limits<double>::infinity();
+  /// One for each pair instead, in GPU memory, or null. A pair whose reach is negative or NaN is an error of
+  /// the report: kBadReach.
+  const double* reach_of_pair = nullptr;
   /// The distance of each pair a step ago, in GPU memory, or null; distances() of this query will do. The
   /// walk of a pair begins with the triangles that were nearest, or with none where they are kNoIndex.
   /// Results are as certified as without. Triangles that do not exist are passed over.

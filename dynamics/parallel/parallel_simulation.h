@@ -1,0 +1,312 @@
+#pragma once
+#include <algorithm>
+#include <cstdint>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "dynamics/parallel/pair_step.h"
+#include "dynamics/parallel/sleep_step.h"
+#include "dynamics/parallel/soft_step.h"
+
+namespace tandem::dynamics {
+
+namespace parallel_simulation_detail {
+
+// States stay where they are, since others look at them.
+struct StatesGoOn {
+  BodyState *before, *start;
+  const BodyState* end;
+  TANDEM_HD void operator()(std::uint32_t i) const { before[i] = start[i], start[i] = end[i]; }
+};
+
+struct CountsGoOn {
+  StepCounts* counts;
+  TANDEM_HD void operator()() const { counts->records_before = counts->pairs; }
+};
+
+}  // namespace parallel_simulation_detail
+
+/// What a parallel simulation is made of.
+struct ParallelBodies {
+  std::span<const BodyProperties> properties;
+  std::span<const BodyState> states;
+  std::span<const double> inner_radii;  ///< of each shape, see inner_radii()
+  std::span<const AssetBox> boxes;      ///< of each shape
+};
+
+struct ParallelOptions {
+  Vector3 gravity = {0, 0, -9.81};
+  SolverOptions solver;  ///< soft contacts for all islands, whatever `kind` says
+  SleepOptions sleep;
+};
+
+/// Moves rigid bodies as Simulation does, by the same rules, all bodies and pairs side by side. All that a
+/// step needs lies in the executor's memory; the CPU looks at a few counts once a step. A step for which
+/// there is too little room is made again with more, and nothing is lost.
+///
+/// Executor: HostExecutor or CudaExecutor. Questions: see PairStep; it has
+///   void forget_needs();           before the questions of a step
+///   Status make_room(bool& grew);  after them: says what was wrong with them, or makes room where some had
+///                                  too little
+///   Status reserve(std::uint32_t bodies, std::uint32_t pairs);
+template <typename Executor, typename Questions>
+class ParallelSimulation {
+ public:
+  /// What the arguments refer to must outlive this.
+  ParallelSimulation(Executor& executor, Questions& questions) : to_(executor), ask_(questions) {}
+
+  /// Places all bodies anew. There are no contacts then.
+  Status set_bodies(const ParallelBodies& bodies, const ParallelOptions& options) {
+    bodies_ = static_cast<std::uint32_t>(bodies.properties.size());
+    options_ = options;
+    within_ = 0;
+    most_pairs_ = most_moved_ = most_found_ = most_remembered_ = 0;
+    for (Status status : {reserve_bodies(bodies), reserve_pairs(std::max(1024u, 8 * bodies_)),
+                          reserve_moved(std::max(256u, bodies_ / 2)),
+                          reserve_contacts(std::max(4096u, 32 * bodies_), std::max(4096u, 32 * bodies_))}) {
+      if (status != Status::kOk) return status;
+    }
+    return put(counts_, StepCounts{});
+  }
+
+  /// Makes a step. Result: kOutOfRange where a body has left the range of numbers, and bad_body() is the
+  /// body; or what a question says. After an error bodies and contacts are as before the step.
+  Status step(double dt) {
+    constexpr int kMostRepeats = 12;
+    for (int repeat = 0; repeat < kMostRepeats; ++repeat) {
+      bool whole = true;
+      const StepArrays a = arrays(dt);
+      const Status status = try_step(a, whole);
+      if (status != Status::kOk) return status;
+      if (!whole) continue;
+      PairStep<Executor, Questions>{to_, ask_, a}.finish();
+      sleep_step(to_, a, options_.sleep);
+      return go_on();
+    }
+    return Status::kOutOfMemory;
+  }
+
+  std::uint32_t bodies() const { return bodies_; }
+  std::uint32_t bad_body() const { return read_.bad_body; }
+  const StepCounts& counts() const { return read_; }  ///< of the last step
+
+  /// The arrays of the last step, whose results are those of the step before now.
+  StepArrays arrays(double dt = 0) const {
+    StepArrays a = {};
+    a.bodies = bodies_;
+    a.properties = properties_.data(), a.acting = acting_.data();
+    a.before = states_[0].data(), a.start = states_[1].data(), a.end = states_[2].data();
+    a.pulls = pulls_.data(), a.forces = has_forces_ ? forces_.data() : nullptr;
+    a.placed = placed_.data(), a.idle = idle_.data();
+    a.asset = asset_.data(), a.pose = pose_.data(), a.motion = motion_.data();
+    a.ways = ways_.data(), a.ways_ahead = ways_ahead_.data();
+    a.quiet = quiet_.data(), a.group = group_.data(), a.label = label_.data(), a.marks = marks_.data();
+    a.inner_radius = inner_radius_.data(), a.boxes = boxes_.data();
+    a.most_pairs = most_pairs_;
+    a.records_before = records_[0].data(), a.records = records_[1].data();
+    a.plans = plans_.data(), a.flags = flags_.data(), a.sums = sums_.data(), a.list = list_.data();
+    a.asked = asked_.data(), a.reach = reach_.data();
+    a.row_first = row_first_.data(), a.row_end = row_end_.data();
+    a.most_moved = most_moved_, a.moved_pairs = moved_pairs_.data(), a.moved_asset = moved_asset_.data();
+    a.moved_pose = moved_pose_.data();
+    a.approaches = approaches_.data(), a.touching = touching_.data();
+    a.most_found = most_found_, a.most_remembered = most_remembered_;
+    a.found = found_.data();
+    a.remembered_before = remembered_[0].data(), a.remembered = remembered_[1].data();
+    a.contacts = contacts_.data(), a.place = place_.data(), a.contact_marks = contact_marks_.data();
+    a.impulses_before = impulses_before_.data(), a.impulses = impulses_.data(), a.done = done_.data();
+    a.counts = counts_.data();
+    a.dt = dt, a.gravity = options_.gravity, a.options = options_.solver;
+    return a;
+  }
+
+ private:
+  template <typename T>
+  using Array = typename Executor::template Array<T>;
+
+  Status try_step(const StepArrays& a, bool& whole) {
+    constexpr int kMostTimes = 3;  // as of Simulation
+    PairStep<Executor, Questions> step{to_, ask_, a};
+    ask_.forget_needs();
+    step.find_contacts(within_);
+    for (int times = 1;; ++times) {
+      solve(step.a);
+      step.find_surprised();
+      const Status status = read(whole);
+      if (status != Status::kOk || !whole) return status;
+      if (read_.bad_body != kNoIndex) return Status::kOutOfRange;
+      if (times == kMostTimes || read_.surprised == 0) return Status::kOk;
+      ask_.forget_needs();
+      step.add_missed();
+      const Status missed = read(whole);
+      if (missed != Status::kOk || !whole || read_.missed == 0) return missed;
+    }
+  }
+
+  void solve(const StepArrays& a) {
+    solver_.step(to_,
+                 {a.acting, a.start, a.pulls, a.bodies, a.contacts, a.impulses_before, a.touching,
+                  &a.counts->touching, a.most_pairs, a.dt},
+                 a.options, {a.end, a.impulses, a.done});
+  }
+
+  // Reads the counts, and makes room where there is too little: then the step is not whole.
+  Status read(bool& whole) {
+    Status status = to_.copy(static_cast<const StepCounts*>(counts_.data()), std::span(&read_, 1));
+    bool grew = false;
+    if (status == Status::kOk) status = ask_.make_room(grew);
+    SoftStepNeeds solver = {};
+    if (status == Status::kOk) status = to_.copy(solver_.needs(), std::span(&solver, 1));
+    const double needed = read_.reach.farthest(0.5 * options_.solver.slop);
+    if (needed > within_) within_ = 1.5 * needed, grew = true;
+    if (status == Status::kOk && read_.pairs > most_pairs_) {
+      grew = true;
+      status = reserve_pairs(read_.pairs + read_.pairs / 4);
+    }
+    const std::uint32_t moved = std::max({read_.middle, read_.approaches, read_.surprised});
+    if (status == Status::kOk && moved > most_moved_) {
+      grew = true;
+      status = reserve_moved(moved + moved / 2);
+    }
+    if (status == Status::kOk && (read_.found > most_found_ || read_.remembered > most_remembered_)) {
+      grew = true;
+      status = reserve_contacts(read_.found + read_.found / 4, read_.remembered + read_.remembered / 4);
+    }
+    if (status == Status::kOk && !grew && solver.has_room == 0) {
+      grew = true;
+      status = solver_.reserve(
+          to_, {bodies_, most_pairs_, solver.groups + solver.groups / 4, solver.rows + solver.rows / 4});
+    }
+    whole = !grew;
+    return status;
+  }
+
+  // The results of a step become what the next one begins with.
+  Status go_on() {
+    const StepArrays a = arrays();
+    to_.for_each(nullptr, bodies_, parallel_simulation_detail::StatesGoOn{a.before, a.start, a.end});
+    std::swap(records_[0], records_[1]), std::swap(remembered_[0], remembered_[1]);
+    within_ = 1.25 * read_.reach.farthest(0.5 * options_.solver.slop);
+    to_.once(parallel_simulation_detail::CountsGoOn{counts_.data()});
+    return to_.status();
+  }
+
+  template <typename T>
+  Status put(Array<T>& array, const T& value) {
+    const Status status = array.reserve(1);
+    return status == Status::kOk ? to_.copy(std::span<const T>(&value, 1), array.data()) : status;
+  }
+  template <typename T>
+  Status put(Array<T>& array, std::span<const T> values) {
+    const Status status = array.reserve(std::max<std::size_t>(1, values.size()));
+    return status == Status::kOk && !values.empty() ? to_.copy(values, array.data()) : status;
+  }
+  template <typename T>
+  Status fill(Array<T>& array, const T& value) {
+    return put<T>(array, std::vector<T>(bodies_, value));
+  }
+
+  Status reserve_bodies(const ParallelBodies& bodies) {
+    std::vector<std::uint32_t> asset;
+    for (const BodyProperties& body : bodies.properties) asset.push_back(body.shape);
+    Status out = Status::kOk;
+    for (Status status :
+         {put<BodyProperties>(properties_, bodies.properties),
+          put<BodyProperties>(acting_, bodies.properties), put<BodyState>(states_[0], bodies.states),
+          put<BodyState>(states_[1], bodies.states), put<BodyState>(states_[2], bodies.states),
+          put<std::uint32_t>(asset_, asset), put<double>(inner_radius_, bodies.inner_radii),
+          put<AssetBox>(boxes_, bodies.boxes), fill<std::uint8_t>(placed_, 0), fill<double>(quiet_, 0),
+          fill<std::uint32_t>(group_, Sleep::kAwake), fill<std::uint8_t>(idle_, 0), pulls_.reserve(bodies_),
+          pose_.reserve(bodies_), motion_.reserve(bodies_), ways_.reserve(bodies_),
+          ways_ahead_.reserve(bodies_), label_.reserve(bodies_), marks_.reserve(bodies_)}) {
+      if (out == Status::kOk) out = status;
+    }
+    return out;
+  }
+
+  Status reserve_pairs(std::uint32_t pairs) {
+    const std::uint32_t kept = most_pairs_;
+    Status out = Status::kOk;
+    for (Status status :
+         {records_[0].grow(pairs, kept), records_[1].grow(pairs, kept), plans_.reserve(pairs),
+          flags_.reserve(pairs + 1), sums_.reserve(pairs + 1), list_.reserve(pairs), asked_.reserve(pairs),
+          reach_.reserve(pairs), row_first_.reserve(pairs), row_end_.reserve(pairs), touching_.reserve(pairs),
+          to_.reserve(pairs + 1), ask_.reserve(bodies_, pairs)}) {
+      if (out == Status::kOk) out = status;
+    }
+    most_pairs_ = out == Status::kOk ? pairs : 0;
+    return out == Status::kOk ? solver_.reserve(to_, usual_room(bodies_, most_pairs_, most_remembered_))
+                              : out;
+  }
+
+  Status reserve_moved(std::uint32_t rows) {
+    std::vector<ObjectPair> pairs(rows);
+    for (std::uint32_t r = 0; r < rows; ++r) pairs[r] = {2 * r, 2 * r + 1};
+    Status out = Status::kOk;
+    // Questions look at the poses of all bodies.
+    for (Status status :
+         {put<ObjectPair>(moved_pairs_, pairs),
+          put<std::uint32_t>(moved_asset_, std::vector<std::uint32_t>(2 * rows)),
+          put<Pose>(moved_pose_, std::vector<Pose>(2 * rows, kIdentityPose)), approaches_.reserve(rows)}) {
+      if (out == Status::kOk) out = status;
+    }
+    most_moved_ = out == Status::kOk ? rows : 0;
+    return out;
+  }
+
+  Status reserve_contacts(std::uint32_t found, std::uint32_t remembered) {
+    found = std::max(found, most_found_), remembered = std::max(remembered, most_remembered_);
+    const std::uint32_t kept = most_remembered_;
+    Status out = Status::kOk;
+    for (Status status :
+         {found_.reserve(found), remembered_[0].grow(remembered, kept), remembered_[1].grow(remembered, kept),
+          contacts_.grow(remembered, kept), place_.reserve(remembered),
+          contact_marks_.reserve(2 * remembered), impulses_before_.reserve(remembered),
+          impulses_.reserve(remembered), done_.grow(remembered, kept)}) {
+      if (out == Status::kOk) out = status;
+    }
+    if (out != Status::kOk) return out;
+    most_found_ = found, most_remembered_ = remembered;
+    return solver_.reserve(to_, usual_room(bodies_, most_pairs_, most_remembered_));
+  }
+
+  Executor& to_;
+  Questions& ask_;
+  ParallelSoftStep<Executor> solver_;
+  ParallelOptions options_;
+  std::uint32_t bodies_ = 0, most_pairs_ = 0, most_moved_ = 0, most_found_ = 0, most_remembered_ = 0;
+  double within_ = 0;  // how far apart near pairs are
+  bool has_forces_ = false;
+  StepCounts read_ = {};
+
+  // See StepArrays.
+  Array<BodyProperties> properties_, acting_;
+  Array<BodyState> states_[3];
+  Array<Pull> pulls_;
+  Array<BodyForce> forces_;
+  Array<std::uint8_t> placed_, idle_;
+  Array<std::uint32_t> asset_, group_, label_, marks_;
+  Array<Pose> pose_;
+  Array<Motion> motion_;
+  Array<BodyWay> ways_, ways_ahead_;
+  Array<double> quiet_, inner_radius_;
+  Array<AssetBox> boxes_;
+  Array<PairRecord> records_[2];
+  Array<PairPlan> plans_;
+  Array<std::uint32_t> flags_, sums_, list_, row_first_, row_end_;
+  Array<ObjectPair> asked_, moved_pairs_;
+  Array<double> reach_;
+  Array<std::uint32_t> moved_asset_;
+  Array<Pose> moved_pose_;
+  Array<Approach> approaches_;
+  Array<ContactPair> touching_;
+  Array<ContactPoint> found_, contacts_;
+  Array<CachedContact> remembered_[2];
+  Array<std::uint32_t> place_;
+  Array<std::uint8_t> contact_marks_;
+  Array<ContactImpulse> impulses_before_, impulses_, done_;
+  Array<StepCounts> counts_;
+};
+
+}  // namespace tandem::dynamics

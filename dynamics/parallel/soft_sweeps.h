@@ -141,14 +141,18 @@ TANDEM_HD inline void hand_on(const SoftSweeps& all, const Sweep& sweep, const S
   using enum Sweep::Kind;
   const bool is_end = sweep.kind == rub && sweep.substep + 1 == all.substeps;
   if (side.is_last && !is_end && (sweep.kind == start || sweep.kind == push || sweep.kind == rub)) {
-    SoftMotion moved = {};
+    // No other pair writes these. They are read together.
+    const SoftMotion gain = all.gains[side.body];
+    SoftMotion start_of_substep = all.starts[side.body],
+               moved = dynamics::motion_of(all.moved[side.body]);
     const BodyWork work = sweep.kind == start  ? BodyWork::begin
                           : sweep.kind == push ? BodyWork::move
                                                : BodyWork::accelerate;
+    work_on(work, static_cast<float>(all.h), gain, start_of_substep, velocity, moved);
     if (work == BodyWork::move)
-      moved = dynamics::motion_of(look_for_turn(all.moved[side.body], sweep.substep));
-    work_on(work, static_cast<float>(all.h), all.gains[side.body], all.starts[side.body], velocity, moved);
-    if (work == BodyWork::move) give_turn(all.moved[side.body], sweep.substep + 1, moved);
+      give_turn(all.moved[side.body], sweep.substep + 1, moved);
+    else
+      all.starts[side.body] = start_of_substep;
   }
   give_turn(all.velocities[side.body], side.turn + 1, velocity);
 }

@@ -122,14 +122,12 @@ class PairVisit {
     const L fastest = all_of<L>(-kFastestPush);
     const L bias_rate = take(pairs_.bias_rate), mass_scale = take(pairs_.mass_scale),
             impulse_scale = take(pairs_.impulse_scale);
-    for (std::uint32_t i = 0; i < contacts_; ++i) {
-      SoftNormal& row = normal(i);
-      const L followed = take(row.followed);
-      const L deep = smaller(none, is_opposed_ ? followed + take(gap(i).opposed) : followed);
-      const auto is_gap = less(none, followed);
-      const L bias = select(is_gap, followed * inverse_h, larger(bias_rate * deep, fastest));
-      visit(i, bias, select(is_gap, one, mass_scale), select(is_gap, none, impulse_scale));
-    }
+    for_normals([&](std::uint32_t i, const NormalRow& row) {
+      const L deep = smaller(none, is_opposed_ ? row.followed + take(gap(i).opposed) : row.followed);
+      const auto is_gap = less(none, row.followed);
+      const L bias = select(is_gap, row.followed * inverse_h, larger(bias_rate * deep, fastest));
+      visit(i, row, bias, select(is_gap, one, mass_scale), select(is_gap, none, impulse_scale));
+    });
   }
 
   // a, b: how far the bodies have moved at this time.
@@ -143,8 +141,9 @@ class PairVisit {
 
   TANDEM_INLINE void relax() {
     const L none{}, one = all_of<L>(1), inverse_h = all_of<L>(rows_.inverse_h);
-    for (std::uint32_t i = 0; i < contacts_; ++i)
-      visit(i, larger(none, take(normal(i).followed) * inverse_h), one, none);
+    for_normals([&](std::uint32_t i, const NormalRow& row) {
+      visit(i, row, larger(none, row.followed * inverse_h), one, none);
+    });
   }
 
   // Friction that was 0 stays 0 while nothing pushes.
@@ -165,15 +164,13 @@ class PairVisit {
   TANDEM_INLINE void rebound() {
     const L none{}, one = all_of<L>(1);
     for (std::uint32_t i = 0; i < contacts_; ++i) {
-      SoftNormal& row = normal(i);
+      const NormalRow row = normal_row(i);
       const L wanted = take(gap(i).rebound);
-      const L old = take(row.impulse);
-      const Direction along = direction(row.direction);
-      const L next = next_impulse(row, along, old, -wanted, one, none);
-      const L change =
-          select(less(none, wanted), select(less(none, take(gap(i).strongest)), next - old, none), none);
-      push(along, change);
-      put(old + change, row.impulse, lane_);
+      const L next = next_impulse(row, -wanted, one, none);
+      const L change = select(less(none, wanted),
+                              select(less(none, take(gap(i).strongest)), next - row.impulse, none), none);
+      push(row.along, change);
+      put(row.impulse + change, normal(i).impulse, lane_);
       put(take(friction(i).sum_of_normal) + change, friction(i).sum_of_normal, lane_);
     }
   }
@@ -189,11 +186,11 @@ class PairVisit {
       squares = squares + size * size;
     };
     for (std::uint32_t i = 0; i < contacts_; ++i) {
-      const SoftNormal& row = normal(i);
-      const L old = take(row.impulse), rebound = take(gap(i).rebound);
+      const NormalRow row = normal_row(i);
+      const L old = row.impulse, rebound = take(gap(i).rebound);
       const auto bounces = less(none, smaller(rebound, take(gap(i).strongest)));
-      const L bias = select(bounces, -rebound, larger(none, take(row.followed) * inverse_h));
-      add(next_impulse(row, direction(row.direction), old, bias, all_of<L>(1), none) - old, take(row.mass));
+      const L bias = select(bounces, -rebound, larger(none, row.followed * inverse_h));
+      add(next_impulse(row, bias, all_of<L>(1), none) - old, row.mass);
       const SoftFriction& rubs = friction(i);
       const L bound = take(rubs.coefficient) * old, mass = take(rubs.mass);
       const L old1 = take(rubs.first_impulse), old2 = take(rubs.second_impulse);
@@ -210,6 +207,31 @@ class PairVisit {
   struct Direction {
     Vector3Of<L> along, turn_a, turn_b;
   };
+  struct NormalRow {
+    Direction along;
+    L mass, drive, followed, impulse;
+  };
+
+  TANDEM_INLINE NormalRow normal_row(std::uint32_t contact) const {
+    const SoftNormal& row = normal(contact);
+    return {direction(row.direction), take(row.mass), take(row.drive), take(row.followed), take(row.impulse)};
+  }
+
+  // Calls visit(i, row) for each contact. One lane reads the next row before it visits one: a GPU solves
+  // while it waits for memory.
+  template <typename Visit>
+  TANDEM_INLINE void for_normals(const Visit& visit) const {
+    if constexpr (L::kLanes > 1) {
+      for (std::uint32_t i = 0; i < contacts_; ++i) visit(i, normal_row(i));
+    } else {
+      NormalRow next = normal_row(0);
+      for (std::uint32_t i = 0; i < contacts_; ++i) {
+        const NormalRow row = next;
+        if (i + 1 < contacts_) next = normal_row(i + 1);
+        visit(i, row);
+      }
+    }
+  }
 
   // See SoftNormal. One mass does for both directions of friction, or it would not oppose the slip.
   TANDEM_INLINE void make_rows(SoftNormal& normal, SoftFriction& friction) const {
@@ -267,20 +289,17 @@ class PairVisit {
     b_.spin = b_.spin + impulse * d.turn_b;
   }
 
-  TANDEM_INLINE L next_impulse(const SoftNormal& row, const Direction& along, const L& impulse, const L& bias,
-                               const L& mass_scale, const L& impulse_scale) const {
-    const L w = speed(along) + take(row.drive);
-    const L wanted = impulse - take(row.mass) * mass_scale * (w + bias) - impulse_scale * impulse;
+  TANDEM_INLINE L next_impulse(const NormalRow& row, const L& bias, const L& mass_scale,
+                               const L& impulse_scale) const {
+    const L w = speed(row.along) + row.drive;
+    const L wanted = row.impulse - row.mass * mass_scale * (w + bias) - impulse_scale * row.impulse;
     return larger(L{}, wanted);
   }
-  TANDEM_INLINE void visit(std::uint32_t contact, const L& bias, const L& mass_scale,
+  TANDEM_INLINE void visit(std::uint32_t contact, const NormalRow& row, const L& bias, const L& mass_scale,
                            const L& impulse_scale) {
-    SoftNormal& row = normal(contact);
-    const L impulse = take(row.impulse);
-    const Direction along = direction(row.direction);
-    const L next = next_impulse(row, along, impulse, bias, mass_scale, impulse_scale);
-    push(along, next - impulse);
-    put(next, row.impulse, lane_);
+    const L next = next_impulse(row, bias, mass_scale, impulse_scale);
+    push(row.along, next - row.impulse);
+    put(next, normal(contact).impulse, lane_);
     if (bounces_) put(larger(take(gap(contact).strongest), next), gap(contact).strongest, lane_);
   }
 

@@ -143,8 +143,7 @@ TANDEM_HD inline void hand_on(const SoftSweeps& all, const Sweep& sweep, const S
   if (side.is_last && !is_end && (sweep.kind == start || sweep.kind == push || sweep.kind == rub)) {
     // No other pair writes these. They are read together.
     const SoftMotion gain = all.gains[side.body];
-    SoftMotion start_of_substep = all.starts[side.body],
-               moved = dynamics::motion_of(all.moved[side.body]);
+    SoftMotion start_of_substep = all.starts[side.body], moved = dynamics::motion_of(all.moved[side.body]);
     const BodyWork work = sweep.kind == start  ? BodyWork::begin
                           : sweep.kind == push ? BodyWork::move
                                                : BodyWork::accelerate;

@@ -42,8 +42,8 @@ class GpuHeap {
       SoftStepNeeds needs = {};
       executor_.take(download<SoftStepNeeds>(step_.needs(), {&needs, 1}, executor_.stream()));
       if (executor_.status() != Status::kOk || needs.has_room != 0) return executor_.status();
-      const SoftStepRoom room = {body_count_, pair_count_, needs.groups, needs.rows};
-      if (const Status status = step_.reserve(executor_, room); status != Status::kOk) return status;
+      const Status status = step_.reserve(executor_, larger_room(step_.room(), needs));
+      if (status != Status::kOk) return status;
     }
   }
 

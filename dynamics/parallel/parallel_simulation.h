@@ -60,7 +60,7 @@ class ParallelSimulation {
   Status set_bodies(const ParallelBodies& bodies, const ParallelOptions& options) {
     bodies_ = static_cast<std::uint32_t>(bodies.properties.size());
     options_ = options;
-    within_ = 0;
+    within_ = 0, has_forces_ = false;
     most_pairs_ = most_moved_ = most_found_ = most_remembered_ = 0;
     for (Status status : {reserve_bodies(bodies), reserve_pairs(std::max(1024u, 8 * bodies_)),
                           reserve_moved(std::max(256u, bodies_ / 2)),
@@ -85,6 +85,18 @@ class ParallelSimulation {
       return go_on();
     }
     return Status::kOutOfMemory;
+  }
+
+  /// Sets what acts on a body from the next step on, beside gravity and contacts. is_new: whether that is
+  /// another force than before.
+  Status set_force(std::uint32_t body, const BodyForce& force, bool& is_new) {
+    Status status = has_forces_ ? Status::kOk : fill<BodyForce>(forces_, {});
+    BodyForce before;
+    if (status == Status::kOk) status = to_.copy(forces_.data() + body, std::span(&before, 1));
+    if (status != Status::kOk) return status;
+    has_forces_ = true;
+    is_new = !(before == force);
+    return to_.copy(std::span<const BodyForce>(&force, 1), forces_.data() + body);
   }
 
   std::uint32_t bodies() const { return bodies_; }

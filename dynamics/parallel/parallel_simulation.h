@@ -47,7 +47,8 @@ struct ParallelOptions {
 ///
 /// Executor: HostExecutor or CudaExecutor. Questions: see PairStep; it has
 ///   void forget_needs();           before the questions of a step
-///   Status make_room(bool& grew);  after them: says what was wrong with them, or makes room where some had
+///   void read_needs();             after them, before the CPU waits
+///   Status make_room(bool& grew);  then: says what was wrong with them, or makes room where some had
 ///                                  too little
 ///   Status reserve(std::uint32_t bodies, std::uint32_t pairs);
 template <typename Executor, typename Questions>
@@ -165,11 +166,13 @@ class ParallelSimulation {
 
   // Reads the counts, and makes room where there is too little: then the step is not whole.
   Status read(bool& whole) {
-    Status status = to_.copy(static_cast<const StepCounts*>(counts_.data()), std::span(&read_, 1));
+    SoftStepNeeds solver = {};
+    to_.copy_later(counts_.data(), read_);
+    to_.copy_later(solver_.needs(), solver);
+    ask_.read_needs();
+    Status status = to_.wait();
     bool grew = false;
     if (status == Status::kOk) status = ask_.make_room(grew);
-    SoftStepNeeds solver = {};
-    if (status == Status::kOk) status = to_.copy(solver_.needs(), std::span(&solver, 1));
     const double needed = read_.reach.farthest(0.5 * options_.solver.slop);
     if (needed > within_) within_ = 1.5 * needed, grew = true;
     if (status == Status::kOk && read_.pairs > most_pairs_) {

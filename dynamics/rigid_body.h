@@ -196,6 +196,14 @@ TANDEM_HD inline void fly(const BodyProperties& body, const Pull& pull, double d
   advance(body, state, -0.5 * gain, -0.5 * turn, dt);
 }
 
+/// Gives a moving body the velocities that an impulse at a point of the world makes.
+inline void push_at(const BodyProperties& body, const Vector3& impulse, const Vector3& point,
+                    BodyState& state) {
+  const Vector3 arm = point - state.position;
+  state.velocity += impulse / body.mass;
+  state.angular_velocity += world_inverse_inertia(body, state) * cross(arm, impulse);
+}
+
 double kinetic_energy(const BodyProperties& body, const BodyState& state);
 
 /// Returns the angular momentum about the world's origin. It is zero for a body that contacts do not move.

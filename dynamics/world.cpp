@@ -372,9 +372,7 @@ Status World::push(std::uint32_t body, const double (&impulse)[3], const double 
   const BodyProperties& of = parts_->simulation->bodies()[body];
   if (of.motion != Motion::moving) return fail(Status::kOk);
   BodyState state = parts_->simulation->states()[body];
-  const Vector3 by = vector_of(impulse), arm = vector_of(at) - state.position;
-  state.velocity += by / of.mass;
-  state.angular_velocity += world_inverse_inertia(of, state) * cross(arm, by);
+  push_at(of, vector_of(impulse), vector_of(at), state);
   if (!is_usable(state)) return fail(Status::kOutOfRange, body);
   parts_->simulation->place(body, state);
   parts_->read();

@@ -4,10 +4,12 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <cstring>
 #include <cub/device/device_radix_sort.cuh>
 #include <cub/device/device_scan.cuh>
 #include <cub/device/device_select.cuh>
 #include <span>
+#include <vector>
 
 #include "dynamics/parallel/worker.h"
 #include "kernels/common/cub_code.cuh"
@@ -162,9 +164,23 @@ class CudaExecutor {
     return wait();
   }
 
+  template <typename T>
+  void copy_later(const T* from, T& to) {
+    static_assert(sizeof(T) <= kMostBytesOfValue);
+    if (error_ == cudaSuccess) take(values_.reserve(kMostValues * kMostBytesOfValue));
+    if (error_ == cudaSuccess && later_.size() == kMostValues) static_cast<void>(wait());
+    if (error_ != cudaSuccess) return;
+    char* const place = values_.data() + later_.size() * kMostBytesOfValue;
+    take(cudaMemcpyAsync(place, from, sizeof(T), cudaMemcpyDeviceToHost, stream_));
+    later_.push_back({&to, sizeof(T)});
+  }
+
   /// Waits until all that is queued is done.
   Status wait() {
     if (error_ == cudaSuccess) take(cudaStreamSynchronize(stream_));
+    for (std::size_t i = 0; i < later_.size() && error_ == cudaSuccess; ++i)
+      std::memcpy(later_[i].to, values_.data() + i * kMostBytesOfValue, later_[i].bytes);
+    later_.clear();
     return status();
   }
 
@@ -204,6 +220,14 @@ class CudaExecutor {
     return cub::DeviceScan::ExclusiveSum(scratch, bytes, in, sums, most + 1, stream_);
   }
 
+  struct Later {
+    void* to;
+    std::size_t bytes;
+  };
+  static constexpr std::size_t kMostValues = 8, kMostBytesOfValue = 256;
+
+  std::vector<Later> later_;
+  PinnedArray<char> values_;
   cudaStream_t stream_;
   cudaError_t error_ = cudaSuccess;
   std::uint32_t room_ = 0;

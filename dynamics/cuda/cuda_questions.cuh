@@ -163,11 +163,12 @@ class CudaQuestions {
     to_.once(cuda_questions_detail::Clear{needs_.data()});
   }
 
+  /// Queues that the needs of the questions are read, for make_room() behind it.
+  void read_needs() { to_.copy_later(needs_.data(), read_); }
+
   Status make_room(bool& grew) {
-    QuestionNeeds needs = {};
-    Status status = to_.copy(static_cast<const QuestionNeeds*>(needs_.data()), std::span(&needs, 1));
-    if (status == Status::kOk) status = status_;
-    if (status == Status::kOk) status = needs.status;
+    QuestionNeeds needs = read_;
+    const Status status = status_ != Status::kOk ? status_ : needs.status;
     if (status != Status::kOk) {
       where_ = needs.where;
       return status;
@@ -221,6 +222,7 @@ class CudaQuestions {
 
   CudaExecutor& to_;
   PairFilter filter_;
+  QuestionNeeds read_ = {};
   std::uint32_t bodies_ = 0, bounds_count_ = 0;
   std::uint64_t where_ = 0;
   Status status_ = Status::kOk;  // of what the CPU finds wrong

@@ -47,7 +47,8 @@ struct ParallelOptions {
 ///
 /// Executor: HostExecutor or CudaExecutor. Questions: see PairStep; it has
 ///   void forget_needs();           before the questions of a step
-///   Status make_room(bool& grew);  after them: says what was wrong with them, or makes room where some had
+///   void read_needs();             after them, before the CPU waits
+///   Status make_room(bool& grew);  then: says what was wrong with them, or makes room where some had
 ///                                  too little
 ///   Status reserve(std::uint32_t bodies, std::uint32_t pairs);
 template <typename Executor, typename Questions>
@@ -60,7 +61,7 @@ class ParallelSimulation {
   Status set_bodies(const ParallelBodies& bodies, const ParallelOptions& options) {
     bodies_ = static_cast<std::uint32_t>(bodies.properties.size());
     options_ = options;
-    within_ = 0;
+    within_ = 0, has_forces_ = false;
     most_pairs_ = most_moved_ = most_found_ = most_remembered_ = 0;
     for (Status status : {reserve_bodies(bodies), reserve_pairs(std::max(1024u, 8 * bodies_)),
                           reserve_moved(std::max(256u, bodies_ / 2)),
@@ -85,6 +86,18 @@ class ParallelSimulation {
       return go_on();
     }
     return Status::kOutOfMemory;
+  }
+
+  /// Sets what acts on a body from the next step on, beside gravity and contacts. is_new: whether that is
+  /// another force than before.
+  Status set_force(std::uint32_t body, const BodyForce& force, bool& is_new) {
+    Status status = has_forces_ ? Status::kOk : fill<BodyForce>(forces_, {});
+    BodyForce before;
+    if (status == Status::kOk) status = to_.copy(forces_.data() + body, std::span(&before, 1));
+    if (status != Status::kOk) return status;
+    has_forces_ = true;
+    is_new = !(before == force);
+    return to_.copy(std::span<const BodyForce>(&force, 1), forces_.data() + body);
   }
 
   std::uint32_t bodies() const { return bodies_; }
@@ -153,11 +166,13 @@ class ParallelSimulation {
 
   // Reads the counts, and makes room where there is too little: then the step is not whole.
   Status read(bool& whole) {
-    Status status = to_.copy(static_cast<const StepCounts*>(counts_.data()), std::span(&read_, 1));
+    SoftStepNeeds solver = {};
+    to_.copy_later(counts_.data(), read_);
+    to_.copy_later(solver_.needs(), solver);
+    ask_.read_needs();
+    Status status = to_.wait();
     bool grew = false;
     if (status == Status::kOk) status = ask_.make_room(grew);
-    SoftStepNeeds solver = {};
-    if (status == Status::kOk) status = to_.copy(solver_.needs(), std::span(&solver, 1));
     const double needed = read_.reach.farthest(0.5 * options_.solver.slop);
     if (needed > within_) within_ = 1.5 * needed, grew = true;
     if (status == Status::kOk && read_.pairs > most_pairs_) {

@@ -47,6 +47,7 @@ class HostQuestions {
   }
 
   void forget_needs() {}
+  void read_needs() {}
   Status make_room(bool& grew) {
     if (near_count_ > most_pairs_) most_pairs_ = near_count_, grew = true;
     return Status::kOk;

@@ -74,7 +74,7 @@ TANDEM_HD inline void fill_body(const SoftStepView& view, std::uint32_t i) {
   view.sweeps.velocities[i] = {}, view.sweeps.moved[i] = {};
   if (!view.is_held(i)) return;
   view.bodies[i] = soft_body(view.numbers, view.unit_root(), i);
-  const_cast<SoftMotion&>(view.sweeps.gains[i]) = gain_of(view.bodies[i], view.numbers.h);
+  view.sweeps.gains[i] = gain_of(view.bodies[i], view.numbers.h);
 }
 
 TANDEM_HD inline void begin_group(const SoftStepView& view, std::uint32_t i) {

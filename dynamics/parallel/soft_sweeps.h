@@ -55,8 +55,7 @@ struct SoftSweeps {
   SoftRows rows;  // without motions
   const SoftTurns* turns;
   SharedMotion *velocities, *moved;  // of each body: what the step adds; turn k of `moved` is substep k
-  const SoftMotion* gains;
-  SoftMotion* starts;
+  SoftMotion *gains, *starts;        // of each body: see work_on()
   const std::uint32_t* groups;
   const std::uint32_t* bounces;  // 1 where any pair does
   double h;

@@ -12,7 +12,7 @@ void measure(const HeapOptions& options) {
   constexpr int kLaunches = 100;
   const RandomHeap heap(options);
   GpuStream stream;
-  expect(stream.create(), "stream");
+  expect(status_of(stream.create()), "stream");
   GpuHeap gpu;
   expect(gpu.upload(heap, stream.get()), "upload");
   expect(gpu.make_step(), "step");

@@ -314,6 +314,10 @@ Status GpuWorld::set_force(std::uint32_t body, const double (&force)[3], const d
   return fail(status == Status::kOk ? parts_->executor.wait() : status);
 }
 
+cudaError_t GpuWorld::cuda_error() const {
+  return parts_ != nullptr ? parts_->executor.error() : cudaSuccess;
+}
+
 double GpuWorld::time() const {
   return parts_ != nullptr ? parts_->time : 0;
 }

@@ -66,9 +66,10 @@ class GpuWorld {
   /// Sets a force and a torque that act on a moving body from now on, see World.
   Status set_force(std::uint32_t body, const double (&force)[3], const double (&torque)[3]);
 
-  double time() const;          ///< seconds of all steps since set_bodies()
-  std::uint64_t where() const;  ///< see World
-  std::size_t bytes() const;    ///< of GPU memory that bodies, pairs and contacts take
+  cudaError_t cuda_error() const;  ///< the first that a call of CUDA returned, where a status is kCudaFailed
+  double time() const;             ///< seconds of all steps since set_bodies()
+  std::uint64_t where() const;     ///< see World
+  std::size_t bytes() const;       ///< of GPU memory that bodies, pairs and contacts take
 
  private:
   struct Parts;

@@ -36,9 +36,14 @@ struct FoundManifolds {
 
 namespace pair_step_detail {
 
+// Returns how many near pairs there are; of those for which there is no room nothing is known.
+TANDEM_HD inline std::uint32_t near_count(const StepArrays& a) {
+  return *a.near_count < a.most_near ? *a.near_count : a.most_near;
+}
+
 // Return how many near pairs, or records of the step before, come before a pair.
 TANDEM_HD inline std::uint32_t near_before(const StepArrays& a, const ObjectPair& pair) {
-  return first_not_before(pair, *a.near_count, [&](std::uint32_t k) { return a.near[k]; });
+  return first_not_before(pair, near_count(a), [&](std::uint32_t k) { return a.near[k]; });
 }
 TANDEM_HD inline std::uint32_t records_before(const StepArrays& a, const ObjectPair& pair) {
   return first_not_before(pair, a.counts->records_before,
@@ -47,7 +52,7 @@ TANDEM_HD inline std::uint32_t records_before(const StepArrays& a, const ObjectP
 
 TANDEM_HD inline bool is_near(const StepArrays& a, const ObjectPair& pair) {
   const std::uint32_t i = near_before(a, pair);
-  return i < *a.near_count && is_same(a.near[i], pair);
+  return i < near_count(a) && is_same(a.near[i], pair);
 }
 
 TANDEM_HD inline std::uint32_t least_of(std::uint32_t a, std::uint32_t b) {
@@ -256,8 +261,8 @@ struct PairStep {
   void find_contacts(double within) {
     begin();
     const PairList near = ask.near({a.asset, a.pose, a.bodies}, a.motion, within);
-    a.near = near.pairs, a.near_count = near.count;
-    join_near_and_remembered(near.most);
+    a.near = near.pairs, a.near_count = near.count, a.most_near = near.most;
+    join_near_and_remembered();
     ask_for_middle();
     ask_for_contacts();
     ask_for_contacts_ahead();
@@ -318,7 +323,7 @@ struct PairStep {
     to.for_each(nullptr, a.bodies, [of] TANDEM_HD(std::uint32_t i) { pair_step_detail::place_body(of, i); });
   }
 
-  void join_near_and_remembered(std::uint32_t most_near) {
+  void join_near_and_remembered() {
     using namespace pair_step_detail;
     const StepArrays of = a;
     to.for_each(&of.counts->records_before, a.most_pairs, [of] TANDEM_HD(std::uint32_t j) {
@@ -326,8 +331,8 @@ struct PairStep {
       of.flags[j] = old.count > 0 && !is_near(of, old.pair) ? 1 : 0;
     });
     to.sum_before(a.flags, &of.counts->records_before, a.most_pairs, a.sums);
-    to.once([of] TANDEM_HD() { of.counts->pairs = *of.near_count + of.sums[of.counts->records_before]; });
-    to.for_each(of.near_count, most_near, [of] TANDEM_HD(std::uint32_t i) {
+    to.once([of] TANDEM_HD() { of.counts->pairs = near_count(of) + of.sums[of.counts->records_before]; });
+    to.for_each(of.near_count, a.most_near, [of] TANDEM_HD(std::uint32_t i) {
       const ObjectPair pair = of.near[i];
       const std::uint32_t j = records_before(of, pair);
       const std::uint32_t at = i + of.sums[j];

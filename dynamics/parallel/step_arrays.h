@@ -74,6 +74,7 @@ struct StepArrays {
   std::uint32_t most_pairs;
   const ObjectPair* near;
   const std::uint32_t* near_count;
+  std::uint32_t most_near;
   PairRecord *records_before, *records;
   PairPlan* plans;
   std::uint32_t *flags, *sums;

@@ -11,7 +11,7 @@ namespace tandem::test {
 /// Bodies of several shapes that fall on a floor and on each other, spinning.
 struct FallingBodies {
   explicit FallingBodies(std::uint32_t count, std::uint32_t seed = 1) {
-    assets.add(box(4, 4, 0.4F));
+    assets.add(box(40, 40, 0.4F));
     assets.add(ring(12, 0.2, 8, 0.06));
     assets.add(cup(12, 0.15F, 0.3F, 0.03F));
     assets.add(box(0.4F, 0.3F, 0.2F));

@@ -210,6 +210,7 @@ class CudaExecutor {
     if (error_ == cudaSuccess) error_ = error;
   }
   Status status() const { return status_of(error_); }
+  cudaError_t error() const { return error_; }
   void forget_error() { error_ = cudaSuccess; }
 
  private:

@@ -148,5 +148,6 @@ std::string text_of(const std::vector<std::int64_t>& shape);
 void add_arrays(nb::module_& module);
 void add_scenes(nb::module_& module);
 void add_gpu_queries(nb::module_& module);
+void add_gpu_worlds(nb::module_& module);
 
 }  // namespace tandem::python

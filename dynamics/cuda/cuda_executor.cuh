@@ -4,10 +4,10 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <cstring>
 #include <cub/device/device_radix_sort.cuh>
 #include <cub/device/device_scan.cuh>
 #include <cub/device/device_select.cuh>
-#include <cstring>
 #include <span>
 #include <vector>
 

@@ -126,8 +126,8 @@ Status GpuWorld::set_bodies(std::span<const BodyDescription> bodies, const World
     status = parts.upload_filter(setup, excluded);
     if (status != Status::kOk) return fail(status);
     parts.simulation.emplace(parts.executor, parts.questions);
-    status = parts.simulation->set_bodies(
-        {setup.properties, setup.states, parts.inner_radii, parts.boxes}, parts.options);
+    status = parts.simulation->set_bodies({setup.properties, setup.states, parts.inner_radii, parts.boxes},
+                                          parts.options);
     if (status != Status::kOk) {
       parts.clear();
       return fail(status);
@@ -144,12 +144,12 @@ Status GpuWorld::Parts::upload_filter(const WorldSetup& setup, std::span<const O
   ExcludedPairTable table;
   Status status = table.set(excluded_pairs);
   if (status == Status::kOk) status = excluded.upload(table.view(), executor.stream());
-  for (const auto& [from, to] : {std::pair(&setup.group, &group), {&setup.mask, &mask}, {&setup.world, &world}}) {
+  for (const auto& [from, to] :
+       {std::pair(&setup.group, &group), {&setup.mask, &mask}, {&setup.world, &world}}) {
     if (status == Status::kOk) status = status_of(to->upload(*from, executor.stream()));
   }
   if (status == Status::kOk) status = executor.wait();
-  const bool one_world =
-      std::ranges::all_of(setup.world, [](std::uint32_t of) { return of == kEveryWorld; });
+  const bool one_world = std::ranges::all_of(setup.world, [](std::uint32_t of) { return of == kEveryWorld; });
   questions.set_filter(
       {nullptr, group.data(), mask.data(), one_world ? nullptr : world.data(), excluded.view()});
   return status;

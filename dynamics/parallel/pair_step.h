@@ -36,11 +36,18 @@ struct FoundManifolds {
 
 namespace pair_step_detail {
 
-// Returns the place of a pair of near ones, or of records, or kNoIndex.
-TANDEM_HD inline std::uint32_t place_in_near(const StepArrays& a, std::uint32_t count,
-                                             const ObjectPair& pair) {
-  const std::uint32_t i = first_not_before(pair, count, [&](std::uint32_t k) { return a.near[k]; });
-  return i < count && a.near[i] == pair ? i : kNoIndex;
+// Return how many near pairs, or records of the step before, come before a pair.
+TANDEM_HD inline std::uint32_t near_before(const StepArrays& a, const ObjectPair& pair) {
+  return first_not_before(pair, *a.near_count, [&](std::uint32_t k) { return a.near[k]; });
+}
+TANDEM_HD inline std::uint32_t records_before(const StepArrays& a, const ObjectPair& pair) {
+  return first_not_before(pair, a.counts->records_before,
+                          [&](std::uint32_t k) { return a.records_before[k].pair; });
+}
+
+TANDEM_HD inline bool is_near(const StepArrays& a, const ObjectPair& pair) {
+  const std::uint32_t i = near_before(a, pair);
+  return i < *a.near_count && is_same(a.near[i], pair);
 }
 
 TANDEM_HD inline std::uint32_t least_of(std::uint32_t a, std::uint32_t b) {
@@ -316,25 +323,22 @@ struct PairStep {
     const StepArrays of = a;
     to.for_each(&of.counts->records_before, a.most_pairs, [of] TANDEM_HD(std::uint32_t j) {
       const PairRecord& old = of.records_before[j];
-      const bool stays = old.count > 0 && place_in_near(of, *of.near_count, old.pair) == kNoIndex;
-      of.flags[j] = stays ? 1 : 0;
+      of.flags[j] = old.count > 0 && !is_near(of, old.pair) ? 1 : 0;
     });
     to.sum_before(a.flags, &of.counts->records_before, a.most_pairs, a.sums);
     to.once([of] TANDEM_HD() { of.counts->pairs = *of.near_count + of.sums[of.counts->records_before]; });
     to.for_each(of.near_count, most_near, [of] TANDEM_HD(std::uint32_t i) {
       const ObjectPair pair = of.near[i];
-      const std::uint32_t records = of.counts->records_before;
-      const std::uint32_t j =
-          first_not_before(pair, records, [&](std::uint32_t k) { return of.records_before[k].pair; });
+      const std::uint32_t j = records_before(of, pair);
       const std::uint32_t at = i + of.sums[j];
       if (at >= of.most_pairs) return;
-      plan_pair(of, at, pair, true, j < records && of.records_before[j].pair == pair ? j : kNoIndex);
+      const bool is_known = j < of.counts->records_before && is_same(of.records_before[j].pair, pair);
+      plan_pair(of, at, pair, true, is_known ? j : kNoIndex);
     });
     to.for_each(&of.counts->records_before, a.most_pairs, [of] TANDEM_HD(std::uint32_t j) {
       if (of.flags[j] == 0) return;
       const ObjectPair pair = of.records_before[j].pair;
-      const std::uint32_t at =
-          of.sums[j] + first_not_before(pair, *of.near_count, [&](std::uint32_t k) { return of.near[k]; });
+      const std::uint32_t at = of.sums[j] + near_before(of, pair);
       if (at < of.most_pairs) plan_pair(of, at, pair, false, j);
     });
   }

@@ -111,6 +111,11 @@ struct StepArrays {
   }
 };
 
+// The default operator is none that nvcc defines for the host.
+TANDEM_HD inline bool is_same(const ObjectPair& p, const ObjectPair& q) {
+  return p.a == q.a && p.b == q.b;
+}
+
 /// Returns the place of the first of `count` pairs that is not before `pair`. Pair: of the i-th one.
 template <typename Pair>
 TANDEM_HD std::uint32_t first_not_before(const ObjectPair& pair, std::uint32_t count, const Pair& pair_at) {

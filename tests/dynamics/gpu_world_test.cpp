@@ -31,7 +31,8 @@ struct BothWorlds {
     SimulationParts parts;
     parts.contacts = make_scene_contacts(of.assets.views(), 1);
     parts.ahead = std::make_unique<ContactsAhead>(of.assets.views(), 1);
-    simulation = std::make_unique<Simulation>(setup.properties, setup.states, std::move(parts), setup.options);
+    simulation =
+        std::make_unique<Simulation>(setup.properties, setup.states, std::move(parts), setup.options);
     EXPECT_EQ(world.set_assets(of.assets.views()), Status::kOk);
     EXPECT_EQ(world.set_bodies(of.descriptions, options), Status::kOk);
   }

@@ -37,7 +37,8 @@ int run(int argc, char** argv) {
     std::fprintf(stderr, "usage: gpu_world_speed FLOOR.bvh BODY.bvh BODIES STEPS [EVERY [FILE]]\n");
     return 2;
   }
-  const int bodies = std::atoi(argv[3]), steps = std::atoi(argv[4]), every = argc > 5 ? std::atoi(argv[5]) : 60;
+  const int bodies = std::atoi(argv[3]), steps = std::atoi(argv[4]),
+            every = argc > 5 ? std::atoi(argv[5]) : 60;
   MappedAsset files[2];
   std::vector<AssetView> assets;
   for (int i = 0; i < 2; ++i) {
@@ -65,13 +66,15 @@ int run(int argc, char** argv) {
     for (int i = 0; i < every; ++i) {
       const auto begin = std::chrono::steady_clock::now();
       const Status status = world.step(1.0 / 60);
-      const double ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
+      const double ms =
+          std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
       if (status != Status::kOk) return fail(status, "step");
       sum += ms, slowest = std::max(slowest, ms);
     }
     std::span<const BodyMotion> motions;
     std::span<const WorldContact> contacts;
-    if (world.bodies(motions) != Status::kOk || world.contacts(contacts) != Status::kOk) return fail(Status::kCudaFailed, "copy");
+    if (world.bodies(motions) != Status::kOk || world.contacts(contacts) != Status::kOk)
+      return fail(Status::kCudaFailed, "copy");
     double fastest = 0, speed = 0, height = 0;
     int asleep = 0;
     for (const BodyMotion& body : motions.subspan(1)) {

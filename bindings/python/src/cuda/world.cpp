@@ -39,7 +39,7 @@ struct OnGpu {
 class GpuWorld : public WorldOf<OnGpu> {
  public:
   GpuWorld(nb::list assets, const GivenOptions& options, int device)
-      : WorldOf(std::move(assets), options, OnGpu{device}) {}
+      : WorldOf(std::move(assets), options, OnGpu{require_gpu(device)}) {}
 
   // The states of the bodies where the steps read and write them.
   Array states() {

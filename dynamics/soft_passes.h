@@ -95,7 +95,8 @@ TANDEM_INLINE void visit_all(const SoftRows& rows, std::uint32_t begin, std::uin
     const SoftPairs& pairs = rows.pairs[i];
     for (int lane = 0; lane < static_cast<int>(pairs.pairs); lane += L::kLanes) {
       const std::uint32_t *const a = pairs.body_a + lane, *const b = pairs.body_b + lane;
-      PairVisit<L> bodies(rows, i, lane, gather(rows.velocities, a, L{}), gather(rows.velocities, b, L{}));
+      PairVisit<L> bodies(rows, i, lane);
+      bodies.begin(gather(rows.velocities, a, L{}), gather(rows.velocities, b, L{}));
       visit(bodies, a, b);
       scatter(bodies.a(), rows.velocities, a);
       scatter(bodies.b(), rows.velocities, b);

@@ -180,9 +180,9 @@ void SoftSolver::fill(const Step& step) {
   });
   const SoftRows rows = rows_of(step);
   threads.for_parts(groups_.size(), kGroupsAtOnce, [&](std::size_t group) {
-    const auto clear = [&](auto& rows) {
-      std::fill_n(rows.begin() + groups_[group].first, groups_[group].contacts,
-                  typename std::decay_t<decltype(rows)>::value_type{});
+    const auto clear = [&](auto& list) {
+      std::fill_n(list.begin() + groups_[group].first, groups_[group].contacts,
+                  typename std::decay_t<decltype(list)>::value_type{});
     };
     clear(normals_), clear(gaps_), clear(frictions_);
     turnings_[group] = {};

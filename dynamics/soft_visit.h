@@ -28,13 +28,20 @@ TANDEM_INLINE L all_of(float x) {
 template <typename L>
 TANDEM_INLINE L taken(const SoftNumber& from, int lane) {
   L out;
-  std::memcpy(&out.v, from.of + lane, sizeof out.v);
+  // One number is no copy of bytes, which a GPU would make byte by byte.
+  if constexpr (L::kLanes == 1)
+    out.v = from.of[lane];
+  else
+    std::memcpy(&out.v, from.of + lane, sizeof out.v);
   return out;
 }
 
 template <typename L>
 TANDEM_INLINE void put(const L& x, SoftNumber& to, int lane) {
-  std::memcpy(to.of + lane, &x.v, sizeof x.v);
+  if constexpr (L::kLanes == 1)
+    to.of[lane] = x.v;
+  else
+    std::memcpy(to.of + lane, &x.v, sizeof x.v);
 }
 
 template <typename L>
@@ -82,23 +89,25 @@ struct MotionOf {
 template <typename L>
 class PairVisit {
  public:
-  /// a, b: how the bodies move.
-  TANDEM_INLINE PairVisit(const SoftRows& rows, std::uint32_t group, int lane, const MotionOf<L>& a,
-                          const MotionOf<L>& b)
+  TANDEM_INLINE PairVisit(const SoftRows& rows, std::uint32_t group, int lane)
       : rows_(rows),
         pairs_(rows.pairs[group]),
         turning_(rows.turnings[group]),
         lane_(lane),
-        a_(a),
-        b_(b),
+        first_(pairs_.first),
+        contacts_(pairs_.contacts),
+        bounces_(pairs_.bounces != 0),
+        is_opposed_(pairs_.is_opposed != 0),
         inverse_mass_a_(taken<L>(pairs_.inverse_mass_a, lane)),
         inverse_mass_b_(taken<L>(pairs_.inverse_mass_b, lane)) {}
 
+  /// Begins the visit with how the bodies move.
+  TANDEM_INLINE void begin(const MotionOf<L>& a, const MotionOf<L>& b) { a_ = a, b_ = b; }
   TANDEM_INLINE const MotionOf<L>& a() const { return a_; }
   TANDEM_INLINE const MotionOf<L>& b() const { return b_; }
 
   TANDEM_INLINE void start() {
-    for (std::uint32_t i = 0; i < pairs_.contacts; ++i) {
+    for (std::uint32_t i = 0; i < contacts_; ++i) {
       SoftFriction& row = friction(i);
       make_rows(normal(i), row);
       push(direction(normal(i).direction), take(normal(i).impulse));
@@ -113,19 +122,17 @@ class PairVisit {
     const L fastest = all_of<L>(-kFastestPush);
     const L bias_rate = take(pairs_.bias_rate), mass_scale = take(pairs_.mass_scale),
             impulse_scale = take(pairs_.impulse_scale);
-    for (std::uint32_t i = 0; i < pairs_.contacts; ++i) {
-      SoftNormal& row = normal(i);
-      const L followed = take(row.followed);
-      const L deep = smaller(none, pairs_.is_opposed != 0 ? followed + take(gap(i).opposed) : followed);
-      const auto is_gap = less(none, followed);
-      const L bias = select(is_gap, followed * inverse_h, larger(bias_rate * deep, fastest));
-      visit(i, bias, select(is_gap, one, mass_scale), select(is_gap, none, impulse_scale));
-    }
+    for_normals([&](std::uint32_t i, const NormalRow& row) {
+      const L deep = smaller(none, is_opposed_ ? row.followed + take(gap(i).opposed) : row.followed);
+      const auto is_gap = less(none, row.followed);
+      const L bias = select(is_gap, row.followed * inverse_h, larger(bias_rate * deep, fastest));
+      visit(i, row, bias, select(is_gap, one, mass_scale), select(is_gap, none, impulse_scale));
+    });
   }
 
   // a, b: how far the bodies have moved at this time.
   TANDEM_INLINE void follow(float time, const MotionOf<L>& a, const MotionOf<L>& b) {
-    for (std::uint32_t i = 0; i < pairs_.contacts; ++i) {
+    for (std::uint32_t i = 0; i < contacts_; ++i) {
       SoftNormal& row = normal(i);
       const Direction along = direction(row.direction);
       put(take(gap(i).separation) + speed(along, a, b) + time * take(row.drive), row.followed, lane_);
@@ -134,15 +141,16 @@ class PairVisit {
 
   TANDEM_INLINE void relax() {
     const L none{}, one = all_of<L>(1), inverse_h = all_of<L>(rows_.inverse_h);
-    for (std::uint32_t i = 0; i < pairs_.contacts; ++i)
-      visit(i, larger(none, take(normal(i).followed) * inverse_h), one, none);
+    for_normals([&](std::uint32_t i, const NormalRow& row) {
+      visit(i, row, larger(none, row.followed * inverse_h), one, none);
+    });
   }
 
   // Friction that was 0 stays 0 while nothing pushes.
   TANDEM_INLINE void rub() {
     const L none{};
     L all{};
-    for (std::uint32_t i = 0; i < pairs_.contacts; ++i) {
+    for (std::uint32_t i = 0; i < contacts_; ++i) {
       SoftFriction& row = friction(i);
       const L push = take(normal(i).impulse);
       all = all + push;
@@ -155,16 +163,14 @@ class PairVisit {
 
   TANDEM_INLINE void rebound() {
     const L none{}, one = all_of<L>(1);
-    for (std::uint32_t i = 0; i < pairs_.contacts; ++i) {
-      SoftNormal& row = normal(i);
+    for (std::uint32_t i = 0; i < contacts_; ++i) {
+      const NormalRow row = normal_row(i);
       const L wanted = take(gap(i).rebound);
-      const L old = take(row.impulse);
-      const Direction along = direction(row.direction);
-      const L next = next_impulse(row, along, old, -wanted, one, none);
-      const L change =
-          select(less(none, wanted), select(less(none, take(gap(i).strongest)), next - old, none), none);
-      push(along, change);
-      put(old + change, row.impulse, lane_);
+      const L next = next_impulse(row, -wanted, one, none);
+      const L change = select(less(none, wanted),
+                              select(less(none, take(gap(i).strongest)), next - row.impulse, none), none);
+      push(row.along, change);
+      put(row.impulse + change, normal(i).impulse, lane_);
       put(take(friction(i).sum_of_normal) + change, friction(i).sum_of_normal, lane_);
     }
   }
@@ -179,12 +185,12 @@ class PairVisit {
       largest = larger(largest, size);
       squares = squares + size * size;
     };
-    for (std::uint32_t i = 0; i < pairs_.contacts; ++i) {
-      const SoftNormal& row = normal(i);
-      const L old = take(row.impulse), rebound = take(gap(i).rebound);
+    for (std::uint32_t i = 0; i < contacts_; ++i) {
+      const NormalRow row = normal_row(i);
+      const L old = row.impulse, rebound = take(gap(i).rebound);
       const auto bounces = less(none, smaller(rebound, take(gap(i).strongest)));
-      const L bias = select(bounces, -rebound, larger(none, take(row.followed) * inverse_h));
-      add(next_impulse(row, direction(row.direction), old, bias, all_of<L>(1), none) - old, take(row.mass));
+      const L bias = select(bounces, -rebound, larger(none, row.followed * inverse_h));
+      add(next_impulse(row, bias, all_of<L>(1), none) - old, row.mass);
       const SoftFriction& rubs = friction(i);
       const L bound = take(rubs.coefficient) * old, mass = take(rubs.mass);
       const L old1 = take(rubs.first_impulse), old2 = take(rubs.second_impulse);
@@ -201,6 +207,31 @@ class PairVisit {
   struct Direction {
     Vector3Of<L> along, turn_a, turn_b;
   };
+  struct NormalRow {
+    Direction along;
+    L mass, drive, followed, impulse;
+  };
+
+  TANDEM_INLINE NormalRow normal_row(std::uint32_t contact) const {
+    const SoftNormal& row = normal(contact);
+    return {direction(row.direction), take(row.mass), take(row.drive), take(row.followed), take(row.impulse)};
+  }
+
+  // Calls visit(i, row) for each contact. One lane reads the next row before it visits one: a GPU solves
+  // while it waits for memory.
+  template <typename Visit>
+  TANDEM_INLINE void for_normals(const Visit& visit) const {
+    if constexpr (L::kLanes > 1) {
+      for (std::uint32_t i = 0; i < contacts_; ++i) visit(i, normal_row(i));
+    } else {
+      NormalRow next = normal_row(0);
+      for (std::uint32_t i = 0; i < contacts_; ++i) {
+        const NormalRow row = next;
+        if (i + 1 < contacts_) next = normal_row(i + 1);
+        visit(i, row);
+      }
+    }
+  }
 
   // See SoftNormal. One mass does for both directions of friction, or it would not oppose the slip.
   TANDEM_INLINE void make_rows(SoftNormal& normal, SoftFriction& friction) const {
@@ -241,12 +272,10 @@ class PairVisit {
   TANDEM_INLINE Direction direction(const SoftDirection& from) const {
     return {taken<L>(from.along, lane_), taken<L>(from.turn_a, lane_), taken<L>(from.turn_b, lane_)};
   }
-  TANDEM_INLINE SoftNormal& normal(std::uint32_t contact) const {
-    return rows_.normals[pairs_.first + contact];
-  }
-  TANDEM_INLINE SoftGap& gap(std::uint32_t contact) const { return rows_.gaps[pairs_.first + contact]; }
+  TANDEM_INLINE SoftNormal& normal(std::uint32_t contact) const { return rows_.normals[first_ + contact]; }
+  TANDEM_INLINE SoftGap& gap(std::uint32_t contact) const { return rows_.gaps[first_ + contact]; }
   TANDEM_INLINE SoftFriction& friction(std::uint32_t contact) const {
-    return rows_.frictions[pairs_.first + contact];
+    return rows_.frictions[first_ + contact];
   }
 
   TANDEM_INLINE static L speed(const Direction& d, const MotionOf<L>& a, const MotionOf<L>& b) {
@@ -260,21 +289,18 @@ class PairVisit {
     b_.spin = b_.spin + impulse * d.turn_b;
   }
 
-  TANDEM_INLINE L next_impulse(const SoftNormal& row, const Direction& along, const L& impulse, const L& bias,
-                               const L& mass_scale, const L& impulse_scale) const {
-    const L w = speed(along) + take(row.drive);
-    const L wanted = impulse - take(row.mass) * mass_scale * (w + bias) - impulse_scale * impulse;
+  TANDEM_INLINE L next_impulse(const NormalRow& row, const L& bias, const L& mass_scale,
+                               const L& impulse_scale) const {
+    const L w = speed(row.along) + row.drive;
+    const L wanted = row.impulse - row.mass * mass_scale * (w + bias) - impulse_scale * row.impulse;
     return larger(L{}, wanted);
   }
-  TANDEM_INLINE void visit(std::uint32_t contact, const L& bias, const L& mass_scale,
+  TANDEM_INLINE void visit(std::uint32_t contact, const NormalRow& row, const L& bias, const L& mass_scale,
                            const L& impulse_scale) {
-    SoftNormal& row = normal(contact);
-    const L impulse = take(row.impulse);
-    const Direction along = direction(row.direction);
-    const L next = next_impulse(row, along, impulse, bias, mass_scale, impulse_scale);
-    push(along, next - impulse);
-    put(next, row.impulse, lane_);
-    if (pairs_.bounces != 0) put(larger(take(gap(contact).strongest), next), gap(contact).strongest, lane_);
+    const L next = next_impulse(row, bias, mass_scale, impulse_scale);
+    push(row.along, next - row.impulse);
+    put(next, normal(contact).impulse, lane_);
+    if (bounces_) put(larger(take(gap(contact).strongest), next), gap(contact).strongest, lane_);
   }
 
   TANDEM_INLINE void rub(SoftFriction& row, const L& push_of_normal) {
@@ -338,8 +364,10 @@ class PairVisit {
   SoftPairs& pairs_;
   SoftTurning& turning_;
   int lane_;
-  MotionOf<L> a_, b_;
+  std::uint32_t first_, contacts_;
+  bool bounces_, is_opposed_;
   L inverse_mass_a_, inverse_mass_b_;
+  MotionOf<L> a_, b_;
 };
 
 }  // namespace

@@ -1,7 +1,9 @@
 #pragma once
 #include <algorithm>
 #include <cstdint>
+#include <cstring>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "dynamics/cuda/cuda_executor.cuh"
@@ -177,18 +179,19 @@ class CudaQuestions {
 
   Status make_room(bool& grew) {
     QuestionNeeds needs = read_;
-    const Status status = status_ != Status::kOk ? status_ : needs.status;
-    if (status != Status::kOk) {
-      where_ = needs.where;
-      return status;
-    }
+    const Status status = std::exchange(needs.status, Status::kOk);
+    const std::uint64_t where = std::exchange(needs.where, 0);
     const auto more = [](auto& number) { number += number / 4; };
     more(needs.near.pairs), more(needs.contacts.pairs), more(needs.contacts.contacts);
     more(needs.contacts.undecided), more(needs.manifolds.pairs), more(needs.manifolds.contacts);
     more(needs.manifolds.manifolds), more(needs.manifolds.points), more(needs.distances.pairs);
     more(needs.distances.block_pairs), more(needs.distances.triangle_pairs), more(needs.distances.settled);
     const QuestionNeeds none = {};
-    if (std::memcmp(&needs, &none, sizeof needs) == 0) return Status::kOk;
+    // What follows from rows that had no room may be anything.
+    if (std::memcmp(&needs, &none, sizeof needs) == 0) {
+      where_ = where;
+      return status_ != Status::kOk ? status_ : status;
+    }
     grew = true;
     return provide(needs);
   }

@@ -43,6 +43,15 @@ inline SoftStepRoom usual_room(std::uint32_t bodies, std::uint32_t pairs, std::u
   return {bodies, pairs, groups, contacts / (kSoftWidth / 2) + 4 * groups};
 }
 
+/// Returns more room for a step that had too little: a quarter more than it needs.
+inline SoftStepRoom larger_room(const SoftStepRoom& room, const SoftStepNeeds& needs) {
+  const auto larger = [](std::uint32_t has, std::uint32_t needed) {
+    return needed > has ? needed + needed / 4 : has;
+  };
+  return {room.bodies, larger(room.pairs, needs.pairs), larger(room.groups, needs.groups),
+          larger(room.rows, needs.rows)};
+}
+
 /// All that a step reads and writes, but for the input.
 struct SoftStepView {
   SoftNumbers numbers;
@@ -65,7 +74,7 @@ TANDEM_HD inline void fill_body(const SoftStepView& view, std::uint32_t i) {
   view.sweeps.velocities[i] = {}, view.sweeps.moved[i] = {};
   if (!view.is_held(i)) return;
   view.bodies[i] = soft_body(view.numbers, view.unit_root(), i);
-  const_cast<SoftMotion&>(view.sweeps.gains[i]) = gain_of(view.bodies[i], view.numbers.h);
+  view.sweeps.gains[i] = gain_of(view.bodies[i], view.numbers.h);
 }
 
 TANDEM_HD inline void begin_group(const SoftStepView& view, std::uint32_t i) {

@@ -55,8 +55,7 @@ struct SoftSweeps {
   SoftRows rows;  // without motions
   const SoftTurns* turns;
   SharedMotion *velocities, *moved;  // of each body: what the step adds; turn k of `moved` is substep k
-  const SoftMotion* gains;
-  SoftMotion* starts;
+  SoftMotion *gains, *starts;        // of each body: see work_on()
   const std::uint32_t* groups;
   const std::uint32_t* bounces;  // 1 where any pair does
   double h;
@@ -141,14 +140,17 @@ TANDEM_HD inline void hand_on(const SoftSweeps& all, const Sweep& sweep, const S
   using enum Sweep::Kind;
   const bool is_end = sweep.kind == rub && sweep.substep + 1 == all.substeps;
   if (side.is_last && !is_end && (sweep.kind == start || sweep.kind == push || sweep.kind == rub)) {
-    SoftMotion moved = {};
+    // No other pair writes these. They are read together.
+    const SoftMotion gain = all.gains[side.body];
+    SoftMotion start_of_substep = all.starts[side.body], moved = dynamics::motion_of(all.moved[side.body]);
     const BodyWork work = sweep.kind == start  ? BodyWork::begin
                           : sweep.kind == push ? BodyWork::move
                                                : BodyWork::accelerate;
+    work_on(work, static_cast<float>(all.h), gain, start_of_substep, velocity, moved);
     if (work == BodyWork::move)
-      moved = dynamics::motion_of(look_for_turn(all.moved[side.body], sweep.substep));
-    work_on(work, static_cast<float>(all.h), all.gains[side.body], all.starts[side.body], velocity, moved);
-    if (work == BodyWork::move) give_turn(all.moved[side.body], sweep.substep + 1, moved);
+      give_turn(all.moved[side.body], sweep.substep + 1, moved);
+    else
+      all.starts[side.body] = start_of_substep;
   }
   give_turn(all.velocities[side.body], side.turn + 1, velocity);
 }
@@ -179,9 +181,9 @@ TANDEM_HD inline void visit_lane(const SoftSweeps& all, std::uint32_t number, co
   if (static_cast<std::uint32_t>(lane) >= all.rows.pairs[group].pairs) return;
   const SoftTurns& turns = all.turns[group];
   const Side sides[2] = {side_of(turns, 0, lane, number), side_of(turns, 1, lane, number)};
+  PairVisit<OneLane> pair(all.rows, group, lane);
   const PairMotions motions = wait_for(all, sweep, sides);
-  PairVisit<OneLane> pair(all.rows, group, lane, lanes_of(motions.velocities[0]),
-                          lanes_of(motions.velocities[1]));
+  pair.begin(lanes_of(motions.velocities[0]), lanes_of(motions.velocities[1]));
   visit(all, sweep, pair, motions);
   if (sides[0].moves) hand_on(all, sweep, sides[0], motion_of(pair.a()));
   if (sides[1].moves) hand_on(all, sweep, sides[1], motion_of(pair.b()));

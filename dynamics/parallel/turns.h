@@ -22,14 +22,12 @@ TANDEM_HD inline TurnWord look_for_turn(const TurnWord& from, std::uint32_t turn
 #ifdef __CUDA_ARCH__
   // 16 bytes are one access, to the cache that all processors share.
   static_cast<void>(turn);
-  std::uint64_t low, high;
-  asm volatile("{ .reg .b128 word; ld.relaxed.gpu.global.b128 word, [%2]; mov.b128 {%0, %1}, word; }"
-               : "=l"(low), "=l"(high)
+  TurnWord out;
+  asm volatile("ld.relaxed.gpu.global.v4.u32 {%0, %1, %2, %3}, [%4];"
+               : "=r"(out.data[0]), "=r"(out.data[1]), "=r"(out.data[2]), "=r"(out.turn)
                : "l"(__cvta_generic_to_global(&from))
                : "memory");
-  return {{static_cast<std::uint32_t>(low), static_cast<std::uint32_t>(low >> 32),
-           static_cast<std::uint32_t>(high)},
-          static_cast<std::uint32_t>(high >> 32)};
+  return out;
 #else
   TurnWord out = {};
   out.turn = std::atomic_ref(const_cast<std::uint32_t&>(from.turn)).load(std::memory_order_acquire);
@@ -41,12 +39,9 @@ TANDEM_HD inline TurnWord look_for_turn(const TurnWord& from, std::uint32_t turn
 /// Hands on the word with these data to whose turn is `turn`.
 TANDEM_HD inline void give_turn(TurnWord& to, std::uint32_t turn, const std::uint32_t (&data)[3]) {
 #ifdef __CUDA_ARCH__
-  const std::uint64_t low = data[0] | std::uint64_t{data[1]} << 32,
-                      high = data[2] | std::uint64_t{turn} << 32;
-  asm volatile(
-      "{ .reg .b128 word; mov.b128 word, {%0, %1}; st.relaxed.gpu.global.b128 [%2], word; }" ::"l"(low),
-      "l"(high), "l"(__cvta_generic_to_global(&to))
-      : "memory");
+  asm volatile("st.relaxed.gpu.global.v4.u32 [%0], {%1, %2, %3, %4};" ::"l"(__cvta_generic_to_global(&to)),
+               "r"(data[0]), "r"(data[1]), "r"(data[2]), "r"(turn)
+               : "memory");
 #else
   for (int i = 0; i < 3; ++i) to.data[i] = data[i];
   std::atomic_ref(to.turn).store(turn, std::memory_order_release);

@@ -13,9 +13,9 @@ namespace tandem::dynamics {
 /// Says of what a RandomHeap is made.
 struct HeapOptions {
   std::uint32_t bodies = 200, pairs = 600;
-  std::uint32_t most_contacts = 6;  ///< of a pair
-  std::uint32_t hub = 0;            ///< so many bodies touch body 0 too, which then moves
-  bool is_near = false;             ///< bodies touch those next in the list
+  std::uint32_t least_contacts = 1, most_contacts = 6;  ///< of a pair
+  std::uint32_t hub = 0;                                ///< so many bodies touch body 0 too, which then moves
+  bool is_near = false;                                 ///< bodies touch those next in the list
   unsigned seed = 1;
 };
 
@@ -42,7 +42,8 @@ struct RandomHeap {
       const std::uint32_t b = heap.is_near ? (a + 1 + below(12)) % heap.bodies : below(heap.bodies);
       if (a != b) touching.insert({std::min(a, b), std::max(a, b)});
     }
-    for (const auto& [a, b] : touching) touch(a, b, 1 + below(heap.most_contacts));
+    for (const auto& [a, b] : touching)
+      touch(a, b, heap.least_contacts + below(heap.most_contacts - heap.least_contacts + 1));
   }
 
   /// Returns the step of these, of which `impulses` and `done` are changed.

@@ -10,6 +10,7 @@
 #include <tuple>
 #include <vector>
 
+#include "gpu/needs_gpu.h"
 #include "kernels/asked.h"
 #include "kernels/query_scenes.h"
 #include "tandem/formats/gpu_memory.h"
@@ -19,25 +20,6 @@
 
 /// Tests of queries on a GPU share these.
 namespace tandem::test {
-
-inline bool no_gpu() {
-  int count = 0;
-  if (cudaGetDeviceCount(&count) == cudaSuccess && count > 0) return false;
-  static_cast<void>(cudaGetLastError());
-  return true;
-}
-
-/// Tests that need a GPU. Base: testing::Test or testing::TestWithParam.
-template <typename Base>
-class NeedsGpu : public Base {
- protected:
-  void SetUp() override {
-    if (no_gpu()) GTEST_SKIP() << "no GPU here";
-  }
-};
-using GpuTest = NeedsGpu<testing::Test>;
-template <typename Parameter>
-using GpuTestOf = NeedsGpu<testing::TestWithParam<Parameter>>;
 
 inline constexpr QueryMode kModes[] = {QueryMode::exact, QueryMode::fast, QueryMode::boxes};
 

@@ -404,8 +404,8 @@ class World:
     def states(self) -> _cuda.Array:
         """How the bodies of a world on a GPU stand and move, (n, 13) float64 in GPU memory, by DLPack and `__cuda_array_interface__`: the very memory that steps read
         and write. A row has the centre of mass, the file's axes as a unit quaternion w, x, y, z, the velocity of the centre and the angular velocity, all in the
-        world. Calls work on the default stream: what you write on another one is waited for, and `wake` called, before the next step. The array keeps its memory
-        when bodies are placed anew; they are in another one then.
+        world. Steps work on the default stream. After you have written there, wait for the stream on which you did, if it was another one, and call `wake`. The
+        array keeps its memory when bodies are placed anew, but the new ones are elsewhere: ask for `states` again.
 
             states = torch.from_dlpack(world.states)
             states[1:, 7:10] *= 0.5  # half as fast

@@ -114,6 +114,15 @@ class CudaQuestions {
 
   std::uint64_t where() const { return where_; }
 
+  /// Returns the first error of a call of CUDA that a query has met.
+  cudaError_t error() const {
+    for (const cudaError_t error :
+         {near_.cuda_error(), contacts_.cuda_error(), manifolds_.cuda_error(), distances_.cuda_error()}) {
+      if (error != cudaSuccess) return error;
+    }
+    return cudaSuccess;
+  }
+
   Status reserve(std::uint32_t bodies, std::uint32_t pairs) {
     bodies_ = bodies;
     QuestionNeeds needs = {};

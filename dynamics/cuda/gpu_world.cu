@@ -314,8 +314,20 @@ Status GpuWorld::set_force(std::uint32_t body, const double (&force)[3], const d
   return fail(status == Status::kOk ? parts_->executor.wait() : status);
 }
 
+double GpuWorld::mass_of(std::uint32_t body) const {
+  if (body >= body_count()) return 0;
+  const BodyProperties& of = parts_->properties[body];
+  return of.motion == Motion::moving ? of.mass : 0;
+}
+
 cudaError_t GpuWorld::cuda_error() const {
-  return parts_ != nullptr ? parts_->executor.error() : cudaSuccess;
+  if (parts_ == nullptr) return cudaErrorUnknown;
+  const Parts& parts = *parts_;
+  for (const cudaError_t error : {parts.files.cuda_error(), parts.excluded.cuda_error(),
+                                  parts.executor.error(), parts.questions.error()}) {
+    if (error != cudaSuccess) return error;
+  }
+  return cudaErrorUnknown;
 }
 
 double GpuWorld::time() const {

@@ -139,12 +139,87 @@ static void test_handles(void) {
   tandem_gpu_contact_query_destroy(query);
 }
 
+static void check_options(tandem_world_options options, tandem_status expected) {
+  tandem_gpu_world* world = NULL;
+  if (options.struct_size == 0) options.struct_size = sizeof options;
+  CHECK_STATUS(tandem_gpu_world_create(&options, NULL, &world), expected);
+  CHECK((world == NULL) == (expected != TANDEM_OK));
+  tandem_gpu_world_destroy(world);
+}
+
+// A world needs a GPU once it is given assets, and not before.
+static void test_a_world(tandem_asset* cube) {
+  typedef tandem_world_options Options;
+  tandem_gpu_world* world = NULL;
+  tandem_allocator none = {sizeof none, 0, NULL, refuse, take_back};
+  CHECK_STATUS(tandem_gpu_world_create(NULL, NULL, NULL), TANDEM_NULL_ARGUMENT);
+  CHECK_STATUS(tandem_gpu_world_create(NULL, &none, &world), TANDEM_OUT_OF_MEMORY);
+  check_options((Options){.no_friction = 1, .substeps = 10000, .threads = 1024}, TANDEM_OK);
+  check_options((Options){.struct_size = 8}, TANDEM_BAD_STRUCT_SIZE);
+  check_options((Options){.continuous = 1}, TANDEM_BAD_OPTION);
+  check_options((Options){.substeps = 10001}, TANDEM_BAD_OPTION);
+  check_options((Options){.threads = 1025}, TANDEM_BAD_OPTION);
+  check_options((Options){.friction = -1}, TANDEM_BAD_OPTION);
+
+  CHECK_STATUS(tandem_gpu_world_create(NULL, NULL, &world), TANDEM_OK);
+  tandem_asset* const list[2] = {cube, NULL};
+  CHECK_STATUS(tandem_gpu_world_set_assets(world, NULL, 1, NULL), TANDEM_NULL_ARGUMENT);
+  CHECK_STATUS(tandem_gpu_world_set_assets(world, list, 2, NULL), TANDEM_NULL_ARGUMENT);
+  CHECK(tandem_gpu_world_where(world) == 1);
+  CHECK_STATUS(tandem_gpu_world_set_assets(world, list, 1, NULL), TANDEM_NO_GPU);
+  CHECK(tandem_gpu_world_where(world) == 0 && tandem_cuda_error() != 0);
+  const tandem_instance body = at(0, 0, 0);
+  tandem_joint joint = {.kind = 9};
+  tandem_body_start start = {.struct_size = sizeof start, .joints = &joint, .joint_count = 1};
+  CHECK_STATUS(tandem_gpu_world_set_bodies(world, &body, 1, NULL, NULL), TANDEM_UNKNOWN_ASSET);
+  CHECK_STATUS(tandem_gpu_world_set_bodies(world, NULL, 1, NULL, NULL), TANDEM_NULL_ARGUMENT);
+  CHECK_STATUS(tandem_gpu_world_set_bodies(world, &body, 1, NULL, &start), TANDEM_BAD_JOINT);
+  joint.kind = TANDEM_BALL;
+  CHECK_STATUS(tandem_gpu_world_set_bodies(world, &body, 1, NULL, &start), TANDEM_BAD_OPTION);
+
+  const tandem_body_motion* bodies = (const tandem_body_motion*)&body;
+  const tandem_world_contact* contacts = NULL;
+  const tandem_object_pair* touching = NULL;
+  const double vector[] = {0, 0, 0};
+  const tandem_body_motion motion = {.pose = body.pose};
+  size_t count = 7;
+  CHECK_STATUS(tandem_gpu_world_bodies(world, &bodies, &count), TANDEM_OK);
+  CHECK(bodies == NULL && count == 0);
+  CHECK_STATUS(tandem_gpu_world_bodies(world, NULL, &count), TANDEM_NULL_ARGUMENT);
+  CHECK_STATUS(tandem_gpu_world_contacts(world, &contacts, NULL), TANDEM_OK);
+  CHECK_STATUS(tandem_gpu_world_touching(world, &touching, NULL), TANDEM_OK);
+  count = 7;
+  CHECK(tandem_gpu_world_states(world, &count) == NULL && count == 0);
+  CHECK_STATUS(tandem_gpu_world_step(world, 0, 1), TANDEM_BAD_DURATION);
+  CHECK_STATUS(tandem_gpu_world_step(world, 1, 1), TANDEM_OK);
+  CHECK_STATUS(tandem_gpu_world_wake(world), TANDEM_OK);
+  CHECK_STATUS(tandem_gpu_world_push(world, 3, vector, vector), TANDEM_UNKNOWN_INSTANCE);
+  CHECK(tandem_gpu_world_where(world) == 3);
+  CHECK_STATUS(tandem_gpu_world_push(world, 0, NULL, vector), TANDEM_NULL_ARGUMENT);
+  CHECK_STATUS(tandem_gpu_world_set_force(world, 0, vector, NULL), TANDEM_NULL_ARGUMENT);
+  CHECK_STATUS(tandem_gpu_world_set_body(world, 0, NULL), TANDEM_NULL_ARGUMENT);
+  CHECK_STATUS(tandem_gpu_world_set_body(world, 0, &motion), TANDEM_UNKNOWN_INSTANCE);
+  CHECK(tandem_gpu_world_time(world) == 0 && tandem_gpu_world_mass(world, 0) == 0);
+  tandem_gpu_world_destroy(world);
+
+  CHECK_STATUS(tandem_gpu_world_set_assets(NULL, list, 1, NULL), TANDEM_NULL_ARGUMENT);
+  CHECK_STATUS(tandem_gpu_world_set_bodies(NULL, &body, 1, NULL, NULL), TANDEM_NULL_ARGUMENT);
+  CHECK_STATUS(tandem_gpu_world_step(NULL, 1, 1), TANDEM_NULL_ARGUMENT);
+  CHECK_STATUS(tandem_gpu_world_bodies(NULL, &bodies, &count), TANDEM_NULL_ARGUMENT);
+  CHECK_STATUS(tandem_gpu_world_wake(NULL), TANDEM_NULL_ARGUMENT);
+  CHECK(tandem_gpu_world_states(NULL, &count) == NULL && count == 0);
+  CHECK(tandem_gpu_world_time(NULL) == 0 && tandem_gpu_world_mass(NULL, 0) == 0 &&
+        tandem_gpu_world_where(NULL) == 0);
+  tandem_gpu_world_destroy(NULL);
+}
+
 int main(int argc, char** argv) {
   if (argc != 2) return printf("usage: gpu_misuse_test ASSETS_FOLDER\n"), 1;
   tandem_asset* cube = build_obj(argv[1], "box_12.obj", NULL);
   test_an_upload(cube);
   test_deforming();
   test_handles();
+  test_a_world(cube);
   tandem_asset_release(cube);
   return failures != 0;
 }

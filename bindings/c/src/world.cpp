@@ -1,31 +1,14 @@
 #include "tandem/dynamics/world.h"
 
-#include <algorithm>
-#include <bit>
-#include <vector>
+#include <memory>
+#include <span>
 
-#include "bodies.h"
-#include "handles.h"
-#include "rows.h"
+#include "world_handle.h"
 
 using namespace tandem;
 using namespace tandem::c;
 
-struct tandem_world : Allocated {
-  Allocator allocator;
-  AssetReferences assets;
-  WorldOptions options;
-  World world;
-  uint64_t where = 0;
-
-  tandem_status fail(tandem_status status, uint64_t at) {
-    where = at;
-    return status;
-  }
-  tandem_status told(Status status) {
-    return status == Status::kOk ? tandem_status{TANDEM_OK} : fail(to_c(status), world.where());
-  }
-};
+struct tandem_world : WorldHandle<World> {};
 
 struct tandem_world_state : Allocated {
   Allocator allocator;
@@ -34,156 +17,9 @@ struct tandem_world_state : Allocated {
 
 namespace {
 
-// Runs the body of a function, see guarded(); `where` begins as 0.
-template <typename Body>
-tandem_status enter(tandem_world* world, const Body& body) noexcept {
-  return guarded(world, [&](tandem_world& self) -> tandem_status {
-    self.where = 0;
-    try {
-      return body(self);
-    } catch (const std::bad_alloc&) {
-      return TANDEM_OUT_OF_MEMORY;
-    }
-  });
-}
-
 template <typename Row, typename Of>
 const Row* rows_of(const tandem_world* world, std::span<const Of> (World::*get)() const, size_t* count) {
   return result<Row>(world != nullptr ? (world->world.*get)() : std::span<const Of>(), count);
-}
-
-// Calls a function of one body and two vectors.
-template <typename Function>
-tandem_status call_with_two(tandem_world* world, Function call, uint32_t body, const double* p,
-                            const double* q) noexcept {
-  return enter(world, [&](tandem_world& self) -> tandem_status {
-    if (p == nullptr || q == nullptr) return TANDEM_NULL_ARGUMENT;
-    return self.told((self.world.*call)(body, {p[0], p[1], p[2]}, {q[0], q[1], q[2]}));
-  });
-}
-
-// An option that a flag says to be 0; left alone where it has its default. False: both say something, or one
-// says what it cannot.
-bool read_option(uint32_t is_zero, double given, double& option) {
-  if (is_zero > 1 || (is_zero == 1 && given != 0) || !(given >= 0)) return false;
-  if (is_zero == 1 || given != 0) option = given;
-  return true;
-}
-
-// The world checks how large they are.
-tandem_status read_options(const tandem_world_options* given, WorldOptions& options) {
-  tandem_world_options read;
-  if (const tandem_status status = read_struct(given, read); status != TANDEM_OK) return status;
-  const bool falls = std::ranges::any_of(read.gravity, [](double g) { return g != 0; });
-  const bool good =
-      read_option(read.no_friction, read.friction, options.friction) &&
-      read_option(read.no_slop, read.slop, options.slop) &&
-      read_option(read.no_rolling_resistance, read.rolling_resistance, options.rolling_resistance) &&
-      read.no_gravity <= 1 && !(read.no_gravity == 1 && falls) && read.no_sleeping <= 1 &&
-      read.continuous <= 1 && read.reserved == 0;
-  if (!good) return TANDEM_BAD_OPTION;
-  if (falls || read.no_gravity == 1) std::ranges::copy(read.gravity, options.gravity);
-  options.restitution = read.restitution;
-  if (read.substeps != 0) options.substeps = read.substeps;
-  if (read.threads != 0) options.threads = read.threads;
-  options.sleeping = read.no_sleeping == 0;
-  options.continuous = read.continuous != 0;
-  return TANDEM_OK;
-}
-
-// Result: TANDEM_OK, TANDEM_BAD_STRUCT_SIZE, TANDEM_BAD_OPTION or TANDEM_MOTION_MISMATCH.
-tandem_status read_start(const tandem_body_start* given, size_t bodies, tandem_body_start& read) {
-  if (const tandem_status status = read_struct(given, read); status != TANDEM_OK) return status;
-  if (read.reserved != 0) return TANDEM_BAD_OPTION;
-  const double* const rows[] = {read.density,      read.velocity,    read.angular_velocity,
-                                read.friction,     read.restitution, read.rolling_resistance,
-                                read.gravity_scale};
-  const bool has_rows = std::ranges::any_of(rows, [](const double* row) { return row != nullptr; });
-  return has_rows && read.count != bodies ? TANDEM_MOTION_MISMATCH : TANDEM_OK;
-}
-
-// The pairs of a filter in the order of its table. Result: TANDEM_OK or TANDEM_UNKNOWN_INSTANCE.
-tandem_status read_excluded(const tandem_excluded_pairs* given, size_t bodies, std::vector<ObjectPair>& pairs,
-                            uint64_t& where) {
-  if (given == nullptr) return TANDEM_OK;
-  if (given->table.view().instances > bodies) {
-    where = given->table.view().row;
-    return TANDEM_UNKNOWN_INSTANCE;
-  }
-  for (const uint64_t key : given->table.slots()) {
-    if (key != ExcludedPairs::kEmpty)
-      pairs.push_back({static_cast<uint32_t>(key >> 32), static_cast<uint32_t>(key)});
-  }
-  return TANDEM_OK;
-}
-
-// Result: TANDEM_OK or TANDEM_BAD_JOINT.
-tandem_status read_joint(const tandem_joint& from, JointDescription& joint) {
-  const bool is_limited = from.has_limits != 0 || from.least != 0 || from.most != 0;
-  if (from.kind > TANDEM_DISTANCE || from.has_limits > 1 || from.may_touch > 1 ||
-      (is_limited && from.has_limits == 0) || from.reserved[0] != 0 || from.reserved[1] != 0)
-    return TANDEM_BAD_JOINT;
-  joint.kind = static_cast<JointKind>(from.kind);
-  joint.a = from.a, joint.b = from.b;
-  std::ranges::copy(from.anchor, joint.anchor);
-  std::ranges::copy(from.anchor_b, joint.anchor_b);
-  std::ranges::copy(from.axis, joint.axis);
-  if (from.has_limits != 0) joint.least = from.least, joint.most = from.most;
-  joint.speed = from.speed, joint.most_effort = from.most_effort;
-  if (from.breaking_force != 0) joint.breaking_force = from.breaking_force;
-  if (from.breaking_torque != 0) joint.breaking_torque = from.breaking_torque;
-  joint.may_touch = from.may_touch != 0;
-  return TANDEM_OK;
-}
-
-// Result: TANDEM_OK, TANDEM_NULL_ARGUMENT or, where `where` is the joint, TANDEM_BAD_JOINT.
-tandem_status read_joints(const tandem_body_start& given, std::vector<JointDescription>& joints,
-                          uint64_t& where) {
-  if (!is_there(given.joints, given.joint_count)) return TANDEM_NULL_ARGUMENT;
-  for (size_t i = 0; i < given.joint_count; ++i) {
-    if (const tandem_status status = read_joint(given.joints[i], joints.emplace_back());
-        status != TANDEM_OK) {
-      where = i;
-      return status;
-    }
-  }
-  return TANDEM_OK;
-}
-
-tandem_status set_bodies(tandem_world& self, const tandem_instance* instances, size_t count,
-                         const tandem_pair_filter* filter, const tandem_body_start* start) {
-  if (!is_there(instances, count)) return TANDEM_NULL_ARGUMENT;
-  tandem_pair_filter read;
-  tandem_body_start starts;
-  std::vector<ObjectPair> excluded;
-  tandem_status status = read_filter(filter, count, read, self.where);
-  if (status == TANDEM_OK) status = read_start(start, count, starts);
-  if (status == TANDEM_OK) status = read_excluded(read.excluded, count, excluded, self.where);
-  std::vector<JointDescription> joints;
-  if (status == TANDEM_OK) status = read_joints(starts, joints, self.where);
-  if (status != TANDEM_OK) return status;
-  std::vector<BodyDescription> bodies(count);
-  for (size_t i = 0; i < count; ++i) {
-    BodyDescription& body = bodies[i];
-    body.asset = instances[i].asset;
-    body.pose = std::bit_cast<Pose>(instances[i].pose);
-    if (read.motion != nullptr) body.filter.motion = static_cast<Motion>(read.motion[i]);
-    if (read.group != nullptr) body.filter.group = read.group[i];
-    if (read.mask != nullptr) body.filter.mask = read.mask[i];
-    if (read.world != nullptr) body.filter.world = read.world[i];
-    const auto take = [i](const double* from, double& to) { to = from != nullptr ? from[i] : to; };
-    take(starts.density, body.density);
-    take(starts.friction, body.material.friction);
-    take(starts.restitution, body.material.restitution);
-    take(starts.rolling_resistance, body.material.rolling_resistance);
-    take(starts.gravity_scale, body.gravity_scale);
-    if (starts.velocity != nullptr) std::copy_n(starts.velocity + 3 * i, 3, body.velocity);
-    if (starts.angular_velocity != nullptr)
-      std::copy_n(starts.angular_velocity + 3 * i, 3, body.angular_velocity);
-  }
-  const Status placed = self.world.set_bodies(bodies, self.options, excluded, joints);
-  if (placed != Status::kNoTopology) return self.told(placed);
-  return self.fail(to_c(placed), bodies[self.world.where()].asset);
 }
 
 }  // namespace
@@ -201,20 +37,17 @@ void tandem_world_destroy(tandem_world* world) {
 }
 
 tandem_status tandem_world_set_assets(tandem_world* world, tandem_asset* const* assets, size_t count) {
-  return enter(world, [&](tandem_world& self) {
-    return self.assets.replace(assets, count, self.where, [&](std::span<const AssetView> views) {
-      return self.told(self.world.set_assets(views));
-    });
+  return set_world_assets(world, assets, count, [](tandem_world& self, std::span<const AssetView> views) {
+    return self.world.set_assets(views);
   });
 }
 
 tandem_status tandem_world_set_bodies(tandem_world* world, const tandem_instance* instances, size_t count,
                                       const tandem_pair_filter* filter, const tandem_body_start* start) {
-  return enter(world, [&](tandem_world& self) {
-    const tandem_status status = set_bodies(self, instances, count, filter, start);
-    if (status != TANDEM_OK) (void)self.world.set_bodies({}, self.options);
-    return status;
-  });
+  return place_bodies(
+      world, instances, count, filter, start, [](tandem_world& self, const GivenBodies& given) {
+        return self.world.set_bodies(given.bodies, self.options, given.excluded, given.joints);
+      });
 }
 
 tandem_status tandem_world_step(tandem_world* world, double dt, uint32_t steps) {
@@ -276,14 +109,7 @@ double tandem_world_mass(const tandem_world* world, uint32_t body) {
 }
 
 tandem_status tandem_world_set_body(tandem_world* world, uint32_t body, const tandem_body_motion* motion) {
-  return enter(world, [&](tandem_world& self) -> tandem_status {
-    if (motion == nullptr) return TANDEM_NULL_ARGUMENT;
-    BodyMotion read = {};
-    read.pose = std::bit_cast<Pose>(motion->pose);
-    std::ranges::copy(motion->velocity, read.velocity);
-    std::ranges::copy(motion->angular_velocity, read.angular_velocity);
-    return self.told(self.world.set(body, read));
-  });
+  return set_body(world, body, motion);
 }
 
 tandem_status tandem_world_set_material(tandem_world* world, uint32_t body, double friction,

@@ -163,16 +163,24 @@ def _core_of(filter: Filter | None) -> _tandem.Filter | None:
     return filter._core
 
 
+def gpu_of(device: str) -> int | None:
+    """The number of the GPU that a device names; None: the CPU."""
+    if device == "cpu":
+        return None
+    kind, _, number = device.partition(":") if isinstance(device, str) else ("", "", "")
+    if kind != "cuda" or not (number or "0").isdecimal():
+        raise ValueError(f"device is {device!r} where 'cpu', 'cuda' or 'cuda:1' is wanted")
+    return int(number or 0)
+
+
 def _device(name: str) -> int:
     """What answers a scene's questions, as the extensions know it; 0: the CPU."""
-    if name == "cpu":
+    gpu = gpu_of(name)
+    if gpu is None:
         return 0
-    kind, _, number = name.partition(":") if isinstance(name, str) else ("", "", "")
-    if kind != "cuda" or not (number or "0").isdecimal():
-        raise ValueError(f"device is {name!r} where 'cpu', 'cuda' or 'cuda:1' is wanted")
     from . import cuda  # says why it is not there
 
-    return cuda.make_device(int(number or 0))
+    return cuda.make_device(gpu)
 
 
 def cores_of(assets: Iterable[Asset]) -> list[_tandem.Asset]:

@@ -3,7 +3,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -14,7 +14,10 @@ from ._asset import Asset
 from ._errors import Error
 from ._poses import explained
 from ._rows import BODY_MOTION, INSTANCE, JOINT, NO_INDEX, PAIR, WORLD_CONTACT, WORLD_JOINT, WORLD_TOUCH
-from ._scene import Filter, _core_of, cores_of
+from ._scene import Filter, _core_of, cores_of, gpu_of
+
+if TYPE_CHECKING:
+    from . import _cuda
 
 __all__ = ["Joint", "World", "WorldState"]
 
@@ -142,6 +145,23 @@ def _material(value: npt.ArrayLike | None, name: str, bodies: int, most: float =
     return given
 
 
+def _missing(what: str) -> NotImplementedError:
+    return NotImplementedError(f"a world on a GPU has no {what} yet: that is of device='cpu'")
+
+
+def _core(gpu: int | None, assets: list[_tandem.Asset], gravity: _Numbers, friction: float, restitution: float, slop: float | None, lever: float | None,
+          substeps: int, sleeping: bool, continuous: bool, threads: int) -> _tandem.World | _cuda.World:
+    """What moves the bodies: the CPU, or the GPU of a number."""
+    options = (assets, gravity, friction, restitution, slop, lever, substeps, sleeping, continuous, threads)
+    if gpu is None:
+        return _tandem.World(*options)
+    if continuous:
+        raise _missing("continuous motion")
+    from . import cuda  # says why it is not there
+
+    return cuda.WorldCore(*options, gpu)
+
+
 class World:
     """Rigid bodies that move under gravity and contacts, which are exact, for any meshes. Lengths are metres, masses kilograms, times seconds, angles radians.
 
@@ -158,7 +178,12 @@ class World:
         substeps: parts of a step that share its contacts, 1 to 10,000.
         sleeping: bodies that rest with all that they touch are left alone.
         continuous: fast bodies are carried to where they first meet others.
-        threads: that a call may use, 1 to 1,024, the caller's thread included. Results do not depend on it.
+        threads: that a call may use, 1 to 1,024, the caller's thread included. Results do not depend on it. Not looked at on a GPU.
+        device: "cpu", or "cuda" or "cuda:1", the GPU on which the bodies move.
+
+    On a GPU bodies move by the same rules, but all contacts are soft, and there are no joints, no continuous motion, no states to save, and no changes of
+    materials: what is missing raises NotImplementedError. Results are arrays in CPU memory, as on the CPU, and `states` lies in GPU memory. The same calls give
+    the same bytes on GPUs of one kind, but not those of the CPU.
 
     Calls let other Python threads run. A world takes one call at a time: a second thread gets RuntimeError; several worlds may share assets.
 
@@ -176,14 +201,14 @@ class World:
                  density: npt.ArrayLike = 1000.0, velocity: npt.ArrayLike | None = None, angular_velocity: npt.ArrayLike | None = None,
                  gravity_scale: npt.ArrayLike = 1.0, joints: Sequence[Joint] = (), gravity: npt.ArrayLike = (0.0, 0.0, -9.81), friction: npt.ArrayLike = 0.5,
                  restitution: npt.ArrayLike = 0.0, slop: float | None = None, rolling_resistance: npt.ArrayLike | None = None, substeps: int = 16,
-                 sleeping: bool = True, continuous: bool = False, threads: int = 1):
+                 sleeping: bool = True, continuous: bool = False, threads: int = 1, device: str = "cpu"):
         world_friction, frictions = _of_world(friction, "friction", _MOST, 0.5)
         world_restitution, restitutions = _of_world(restitution, "restitution", 1.0, 0.0)
         world_lever, levers = _of_world(rolling_resistance, "rolling_resistance", _MOST, None)
         if not isinstance(assets, Asset):  # which cores_of() refuses
             assets = list(assets)
-        self._core = _tandem.World(
-            cores_of(assets), _gravity(gravity), world_friction, world_restitution, None if slop is None else amount(slop, "slop", _MOST),
+        self._core = _core(
+            gpu_of(device), cores_of(assets), _gravity(gravity), world_friction, world_restitution, None if slop is None else amount(slop, "slop", _MOST),
             world_lever, whole_number(substeps, "substeps", 1, 10_000), flag(sleeping, "sleeping"), flag(continuous, "continuous"), whole_number(threads, "threads", 1, 1024))
         self._assets = list(assets)
         self._asset = np.zeros(0, np.uint32)
@@ -222,6 +247,8 @@ class World:
                  _material(restitution, "restitution", len(bodies), 1.0), _material(rolling_resistance, "rolling_resistance", len(bodies)),
                  _of_each(gravity_scale, "gravity_scale", len(bodies)))
         joined = _joint_rows(joints)
+        if joints:
+            self._on_cpu("joints")
         self._asset, self._filter = np.zeros(0, np.uint32), None
         try:
             self._core.set_bodies(bodies, _core_of(filter), *given, joined)
@@ -316,11 +343,11 @@ class World:
             material.append(-1.0 if value is None else number(value, name))
             if not material[-1] <= most:
                 raise ValueError(f"{name} is {material[-1]} where at most {most:g} is wanted")
-        self._core.set_material(row, *material)
+        self._on_cpu("set_material()").set_material(row, *material)
 
     def set_gravity_scale(self, body: int, gravity_scale: float) -> None:
         """Sets the part of gravity that acts on a body; 0: it floats. States keep it. Wakes as `set_material` does."""
-        self._core.set_gravity_scale(self._body(body), number(gravity_scale, "gravity_scale"))
+        self._on_cpu("set_gravity_scale()").set_gravity_scale(self._body(body), number(gravity_scale, "gravity_scale"))
 
     def add_joint(self, joint: Joint) -> int:
         """Joins bodies as they are now, and wakes them. Returns the joint's place in `joints`: the first from which a joint has been removed, or else one at the end.
@@ -340,20 +367,20 @@ class World:
         >>> world.velocity.round(2).tolist()
         [[0.0, 0.0, -9.81]]
         """
-        return self._core.add_joint(_joint_rows([joint]))
+        return self._on_cpu("joints").add_joint(_joint_rows([joint]))
 
     def remove_joint(self, joint: int) -> None:
         """Removes a joint, broken or not, and wakes the bodies. Others keep their places. Error, where `where` is the joint: there is none such."""
-        self._core.remove_joint(whole_number(joint, "joint", 0, NO_INDEX))
+        self._on_cpu("joints").remove_joint(whole_number(joint, "joint", 0, NO_INDEX))
 
     def set_motor(self, joint: int, speed: float, most_effort: float) -> None:
         """Gives the motor of a hinge or slider another speed and greatest torque or force, and wakes the bodies. Error, where `where` is the joint: there is none
         such, it has broken, or it has no motor."""
-        self._core.set_motor(whole_number(joint, "joint", 0, NO_INDEX), number(speed, "speed"), number(most_effort, "most_effort"))
+        self._on_cpu("joints").set_motor(whole_number(joint, "joint", 0, NO_INDEX), number(speed, "speed"), number(most_effort, "most_effort"))
 
     def save(self) -> WorldState:
         """Keeps all that the next steps depend on."""
-        return WorldState(self._core.save())
+        return WorldState(self._on_cpu("save()").save())
 
     def restore(self, state: WorldState) -> None:
         """Goes back to a state of this world that was saved since its bodies were placed, else Error. There are no contacts until the next step.
@@ -367,7 +394,35 @@ class World:
         """
         if not isinstance(state, WorldState):
             raise TypeError(f"state is {type(state).__name__} where a tandem.WorldState is wanted")
-        self._core.restore(state._core)
+        self._on_cpu("restore()").restore(state._core)
+
+    def wake(self) -> None:
+        """Wakes all bodies of a world on a GPU. Call it once you have written to `states`."""
+        self._on_gpu("wake()").wake()
+
+    @property
+    def states(self) -> _cuda.Array:
+        """How the bodies of a world on a GPU stand and move, (n, 13) float64 in GPU memory, by DLPack and `__cuda_array_interface__`: the very memory that steps read
+        and write. A row has the centre of mass, the file's axes as a unit quaternion w, x, y, z, the velocity of the centre and the angular velocity, all in the
+        world. Steps work on the default stream. After you have written there, wait for the stream on which you did, if it was another one, and call `wake`. The
+        array keeps its memory when bodies are placed anew, but the new ones are elsewhere: ask for `states` again.
+
+            states = torch.from_dlpack(world.states)
+            states[1:, 7:10] *= 0.5  # half as fast
+            world.wake()
+        """
+        return self._on_gpu("states").states()
+
+    def _on_cpu(self, what: str) -> _tandem.World:
+        """What moves the bodies, if it is the CPU; NotImplementedError names what a GPU has not."""
+        if not isinstance(self._core, _tandem.World):
+            raise _missing(what)
+        return self._core
+
+    def _on_gpu(self, what: str) -> _cuda.World:
+        if isinstance(self._core, _tandem.World):
+            raise NotImplementedError(f"a world on the CPU has no {what}: that is of device='cuda'")
+        return self._core
 
     def _body(self, body: int) -> int:
         count = self._core.count()
@@ -450,7 +505,7 @@ class World:
     @property
     def touching(self) -> Rows:
         """The pairs of bodies that touch in the last step, a copy, array of WORLD_TOUCH, ascending: at its start they had a contact that is no gap, or one of their
-        contacts pushed in it. Two bodies that sleep go on as they were. `impulse` says how hard they pushed each other apart, in newton seconds, `position`
+        contacts pushed in it. Two bodies that sleep go on as they were. On a GPU it is an array of PAIR. `impulse` says how hard they pushed each other apart, in newton seconds, `position`
         where the hardest contact is, and `speed` how fast they approached each other at the start of the step.
 
         >>> world = tandem.World([box], translation=[[0, 0, 0], [0, 0, 1.01]], filter=tandem.Filter(motion=[tandem.FIXED, tandem.MOVING]))
@@ -463,25 +518,25 @@ class World:
         [(0, 1)] began: []
         [(0, 1)] began: []
         """
-        return np.frombuffer(self._core.touching(), WORLD_TOUCH)
+        return np.frombuffer(self._core.touching(), WORLD_TOUCH if isinstance(self._core, _tandem.World) else PAIR)
 
     @property
     def began(self) -> Rows:
         """The pairs that came to touch in any of the steps of the last call of `step`, a copy, array of WORLD_TOUCH, ascending; a pair that bounced is in `ended` too.
         Each has the numbers of the step of the call, from when the pair began to touch, in which it pushed hardest, and the largest speed: an impact often takes two
         steps, the first of which lets the bodies come as far as they meet."""
-        return np.frombuffer(self._core.began(), WORLD_TOUCH)
+        return np.frombuffer(self._on_cpu("began").began(), WORLD_TOUCH)
 
     @property
     def ended(self) -> Rows:
         """The pairs that came to touch no longer in any of the steps of the last call of `step`, a copy, array of PAIR, ascending."""
-        return np.frombuffer(self._core.ended(), PAIR)
+        return np.frombuffer(self._on_cpu("ended").ended(), PAIR)
 
     @property
     def broken(self) -> npt.NDArray[np.uint32]:
         """The joints that broke in any of the steps of the last call of `step`, a copy, ascending. A broken joint keeps its place until it is removed, and its bodies may
         touch from the next step on."""
-        return np.frombuffer(self._core.broken(), np.uint32)
+        return np.frombuffer(self._on_cpu("joints").broken(), np.uint32)
 
     @property
     def joints(self) -> Rows:
@@ -494,7 +549,7 @@ class World:
         >>> world.joints["speed"].round(3).tolist()
         [2.0]
         """
-        return np.frombuffer(self._core.joints(), WORLD_JOINT)
+        return np.frombuffer(self._on_cpu("joints").joints(), WORLD_JOINT)
 
     @property
     def time(self) -> float:

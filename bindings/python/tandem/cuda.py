@@ -1,4 +1,4 @@
-"""Queries on an NVIDIA GPU, of arrays that lie there: poses in and results out without a copy.
+"""Queries on an NVIDIA GPU, of arrays that lie there: poses in and results out without a copy. Worlds on a GPU are `tandem.World(..., device="cuda")`.
 
     query = tandem.cuda.Query([cow])
     found = query.contacts(pose=poses)                  # (n, 4, 3) float64 of PyTorch, CuPy, JAX, ...
@@ -32,6 +32,7 @@ __all__ = ["Array", "Contacts", "Contained", "Distances", "Filter", "Impacts", "
 Array = _cuda.Array
 
 make_device = _cuda.make_device  # for tandem.Scene
+WorldCore = _cuda.World  # for tandem.World
 
 _MODES = ("exact", "fast", "boxes")
 _CONTENTS = ("all", "exact", "manifolds")

@@ -8,6 +8,7 @@
 
 #include "entry.h"
 #include "rows.h"
+#include "tandem/dynamics/gpu_world.h"
 #include "tandem/formats/gpu_memory.h"
 #include "tandem/formats/gpu_status.h"
 #include "tandem/kernels/detail/buffer.h"

@@ -38,3 +38,5 @@ struct Same_tandem_gpu_probe_counters { using Ours = GpuProbeCounters; using The
   TANDEM_SAME(probes); TANDEM_SAME(hits); TANDEM_SAME(blocks); TANDEM_SAME(by_float64); };
 struct Same_tandem_gpu_probe_report { using Ours = GpuProbeReport; using Theirs = tandem_gpu_probe_report; TANDEM_SAME_SIZE(); TANDEM_SAME(status);
   TANDEM_SAME(complete); TANDEM_SAME(where); TANDEM_SAME(needed); TANDEM_SAME(rows); TANDEM_SAME(exact); TANDEM_SAME(counters); };
+struct Same_tandem_gpu_body_state { using Ours = GpuBodyState; using Theirs = tandem_gpu_body_state; TANDEM_SAME_SIZE(); TANDEM_SAME(position);
+  TANDEM_SAME(orientation); TANDEM_SAME(velocity); TANDEM_SAME(angular_velocity); };

@@ -90,9 +90,18 @@ void check_whole(tandem_status status) {
   if (status != TANDEM_OK) throw_status(status, tandem_status_explain(status), nullptr, 0);
 }
 
+int require_gpu(int number) {
+  int count = 0;
+  if (cudaGetDeviceCount(&count) != cudaSuccess) static_cast<void>(cudaGetLastError());
+  if (count == 0 || (number >= 0 && number < count)) return number;
+  throw nb::value_error(
+      ("device is GPU " + std::to_string(number) + " where 0 to " + std::to_string(count - 1) + " are there")
+          .c_str());
+}
+
 OnDevice::OnDevice(int device) {
   int current = -1;
-  // If there is no such GPU, the call that follows says so.
+  // If there is no GPU, the call that follows says so.
   if (cudaGetDevice(&current) != cudaSuccess || (current != device && cudaSetDevice(device) != cudaSuccess))
     static_cast<void>(cudaGetLastError());
   else if (current != device)

@@ -21,6 +21,10 @@ void check_cuda(cudaError_t error);
 /// Checks a status that comes without the number of what is to blame, as check() does.
 void check_whole(tandem_status status);
 
+/// Throws ValueError where there are GPUs, but none of this number. Where there is none at all, the call that
+/// follows says so. Returns the number.
+int require_gpu(int number);
+
 /// While it lives, the device is the current one.
 class OnDevice {
  public:
@@ -148,5 +152,6 @@ std::string text_of(const std::vector<std::int64_t>& shape);
 void add_arrays(nb::module_& module);
 void add_scenes(nb::module_& module);
 void add_gpu_queries(nb::module_& module);
+void add_gpu_worlds(nb::module_& module);
 
 }  // namespace tandem::python

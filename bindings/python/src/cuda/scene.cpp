@@ -17,7 +17,7 @@ std::uint32_t count_of(std::int64_t length, const GivenArray& array) {
 
 Assets::Assets(nb::list assets, int device, std::uint32_t contents, std::vector<std::uint32_t> deforming,
                bool takes_float64, const Stream& stream)
-    : device_(device), takes_float64_(takes_float64), deforming_(std::move(deforming)) {
+    : device_(require_gpu(device)), takes_float64_(takes_float64), deforming_(std::move(deforming)) {
   const OnDevice current(device);
   upload(assets, contents, stream);
   if (deforming_.empty()) return;

@@ -1,5 +1,6 @@
-/// Tandem's C interface to queries on a GPU: libtandem_cuda.so, beside libtandem.so, whose assets it takes.
-/// C99 and C++; needs no header of CUDA's. docs/c.md is its page; what calls mean is in docs/gpu.md.
+/// Tandem's C interface to queries and worlds on a GPU: libtandem_cuda.so, beside libtandem.so, whose assets
+/// it takes. C99 and C++; needs no header of CUDA's. docs/c.md is its page; what calls mean is in
+/// docs/gpu.md.
 ///
 /// The conventions are those of tandem.h, and these:
 /// - Poses, pairs and results lie in GPU memory. Arrays of results belong to their query: they stay where
@@ -679,6 +680,71 @@ TANDEM_API const tandem_gpu_probe_report* tandem_gpu_probe_query_device_report(
 TANDEM_API tandem_status tandem_gpu_probe_query_get_report(const tandem_gpu_probe_query* query,
                                                            tandem_gpu_probe_report* report);
 TANDEM_API size_t tandem_gpu_probe_query_bytes(const tandem_gpu_probe_query* query);
+
+/// ---- Worlds on a GPU
+
+/// Rigid bodies that move on a GPU, by the rules of a tandem_world and from the same structs. Bodies,
+/// contacts and pairs stay in GPU memory. It has no joints, no continuous motion and no states to go back to,
+/// and all contacts are soft; docs/dynamics.md says what that means. The same calls give the same bytes on
+/// GPUs of one kind, but not those of a tandem_world. A world takes one call at a time, and belongs to the
+/// device that was current when it was given its assets.
+typedef struct tandem_gpu_world tandem_gpu_world;
+
+/// How a body stands and moves, in GPU memory: 13 numbers.
+typedef struct tandem_gpu_body_state {
+  double position[3];          ///< of the centre of mass, in the world
+  double orientation[4];       ///< of the file's axes, as a unit quaternion w, x, y, z
+  double velocity[3];          ///< of the centre
+  double angular_velocity[3];  ///< in the world
+} tandem_gpu_body_state;
+
+/// Makes a world, which has the options for good; `threads` is only checked. It needs no GPU yet. Result: as
+/// of tandem_world_create(), and TANDEM_BAD_OPTION where `continuous` is set.
+TANDEM_API tandem_status tandem_gpu_world_create(const tandem_world_options* options,
+                                                 const tandem_allocator* allocator, tandem_gpu_world** world);
+/// Waits for the GPU. Null does nothing.
+TANDEM_API void tandem_gpu_world_destroy(tandem_gpu_world* world);
+/// Copies the assets that bodies refer to to the GPU, and waits; what the world does from then on is queued
+/// on the stream. There are no bodies afterwards. Result: as of tandem_world_set_assets(); also, where
+/// tandem_gpu_world_where() is the asset, TANDEM_NO_ORIENTED_BLOCKS and TANDEM_NO_TOPOLOGY.
+TANDEM_API tandem_status tandem_gpu_world_set_assets(tandem_gpu_world* world, tandem_asset* const* assets,
+                                                     size_t count, tandem_stream stream);
+/// Places all bodies anew, at time 0. The arguments lie in CPU memory. Result: as of
+/// tandem_world_set_bodies(), and TANDEM_BAD_OPTION where `start` has joints. After an error there are no
+/// bodies.
+TANDEM_API tandem_status tandem_gpu_world_set_bodies(tandem_gpu_world* world,
+                                                     const tandem_instance* instances, size_t count,
+                                                     const tandem_pair_filter* filter,
+                                                     const tandem_body_start* start);
+/// Makes steps of dt seconds, and waits for them. Result: as of tandem_world_step(). After an error bodies
+/// are as after the last step that was whole.
+TANDEM_API tandem_status tandem_gpu_world_step(tandem_gpu_world* world, double dt, uint32_t steps);
+/// Copy from the GPU what tandem_world_bodies(), tandem_world_contacts() and tandem_world_touching() return,
+/// though of pairs that touch the bodies alone: null and 0 where there are none, and after an error. Valid
+/// until the next call. count: or null.
+TANDEM_API tandem_status tandem_gpu_world_bodies(tandem_gpu_world* world, const tandem_body_motion** bodies,
+                                                 size_t* count);
+TANDEM_API tandem_status tandem_gpu_world_contacts(tandem_gpu_world* world,
+                                                   const tandem_world_contact** contacts, size_t* count);
+TANDEM_API tandem_status tandem_gpu_world_touching(tandem_gpu_world* world,
+                                                   const tandem_object_pair** touching, size_t* count);
+/// Returns the state of each body, in GPU memory, as it is after the last step, and how many there are; null
+/// and 0 without bodies. It stays where it is until bodies are placed or assets are set. Who writes there
+/// calls tandem_gpu_world_wake() once that is done.
+TANDEM_API tandem_gpu_body_state* tandem_gpu_world_states(const tandem_gpu_world* world, size_t* count);
+/// Wakes all bodies.
+TANDEM_API tandem_status tandem_gpu_world_wake(tandem_gpu_world* world);
+/// Do what tandem_world_set_body(), tandem_world_push() and tandem_world_set_force() do.
+TANDEM_API tandem_status tandem_gpu_world_set_body(tandem_gpu_world* world, uint32_t body,
+                                                   const tandem_body_motion* motion);
+TANDEM_API tandem_status tandem_gpu_world_push(tandem_gpu_world* world, uint32_t body, const double* impulse,
+                                               const double* at);
+TANDEM_API tandem_status tandem_gpu_world_set_force(tandem_gpu_world* world, uint32_t body,
+                                                    const double* force, const double* torque);
+/// Return what tandem_world_time(), tandem_world_mass() and tandem_world_where() do.
+TANDEM_API double tandem_gpu_world_time(const tandem_gpu_world* world);
+TANDEM_API double tandem_gpu_world_mass(const tandem_gpu_world* world, uint32_t body);
+TANDEM_API uint64_t tandem_gpu_world_where(const tandem_gpu_world* world);
 
 #ifdef __cplusplus
 }

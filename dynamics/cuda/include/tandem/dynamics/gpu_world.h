@@ -66,10 +66,15 @@ class GpuWorld {
   /// Sets a force and a torque that act on a moving body from now on, see World.
   Status set_force(std::uint32_t body, const double (&force)[3], const double (&torque)[3]);
 
-  cudaError_t cuda_error() const;  ///< the first that a call of CUDA returned, where a status is kCudaFailed
-  double time() const;             ///< seconds of all steps since set_bodies()
-  std::uint64_t where() const;     ///< see World
-  std::size_t bytes() const;       ///< of GPU memory that bodies, pairs and contacts take
+  /// Returns the body's mass; 0 of one that contacts do not move.
+  double mass_of(std::uint32_t body) const;
+
+  /// Returns the error behind the last status of a GPU; cudaErrorUnknown where it is not known.
+  cudaError_t cuda_error() const;
+
+  double time() const;          ///< seconds of all steps since set_bodies()
+  std::uint64_t where() const;  ///< see World
+  std::size_t bytes() const;    ///< of GPU memory that bodies, pairs and contacts take
 
  private:
   struct Parts;

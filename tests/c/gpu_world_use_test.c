@@ -1,0 +1,216 @@
+// Moves bodies on a GPU by the C interface: they come to rest as those of a world on the CPU do, what is
+// asked of them, and the same bytes twice. C99. Usage: gpu_world_use_test ASSETS_FOLDER   Exit code 77: there
+// is no GPU.
+#include <math.h>
+
+#include "gpu_c_test.h"
+
+enum { kBodies = 9 };
+
+static tandem_asset* box;
+
+/// A fixed box, and above it boxes that fall on it and on each other, turned about no axis and off by a bit.
+static void place(tandem_instance* bodies, uint8_t* motion) {
+  for (int i = 0; i < kBodies; ++i) {
+    bodies[i] = at(0.01 * i, 0.02 * i, 1.02 * i);
+    motion[i] = i == 0 ? TANDEM_FIXED : TANDEM_MOVING;
+  }
+}
+
+static tandem_gpu_world* world_of_boxes(const tandem_world_options* options) {
+  tandem_instance bodies[kBodies];
+  uint8_t motion[kBodies];
+  const tandem_pair_filter filter = {.struct_size = sizeof filter, .count = kBodies, .motion = motion};
+  tandem_gpu_world* world = NULL;
+  place(bodies, motion);
+  CHECK_STATUS(tandem_gpu_world_create(options, NULL, &world), TANDEM_OK);
+  CHECK_STATUS(tandem_gpu_world_set_assets(world, &box, 1, NULL), TANDEM_OK);
+  CHECK_STATUS(tandem_gpu_world_set_bodies(world, bodies, kBodies, &filter, NULL), TANDEM_OK);
+  return world;
+}
+
+static const tandem_body_motion* bodies_of(tandem_gpu_world* world) {
+  const tandem_body_motion* bodies = NULL;
+  size_t count = 0;
+  CHECK_STATUS(tandem_gpu_world_bodies(world, &bodies, &count), TANDEM_OK);
+  CHECK(count == kBodies && bodies != NULL);
+  if (count != kBodies) exit(1);
+  return bodies;
+}
+
+static tandem_gpu_body_state* copy_states(const tandem_gpu_world* world) {
+  size_t count = 0;
+  const tandem_gpu_body_state* states = tandem_gpu_world_states(world, &count);
+  CHECK(count == kBodies && states != NULL);
+  return (tandem_gpu_body_state*)from_gpu(states, kBodies * sizeof *states);
+}
+
+// A body that falls freely does as on the CPU.
+static void test_a_fall_is_that_of_the_cpu(void) {
+  const tandem_instance body = at(0, 0, 5);
+  const double velocity[] = {1, 0, 2}, turning[] = {0, 0.5, 1};
+  const tandem_body_start start = {
+      .struct_size = sizeof start, .count = 1, .velocity = velocity, .angular_velocity = turning};
+  tandem_gpu_world* world = NULL;
+  tandem_world* expected = NULL;
+  CHECK_STATUS(tandem_gpu_world_create(NULL, NULL, &world), TANDEM_OK);
+  CHECK_STATUS(tandem_world_create(NULL, NULL, &expected), TANDEM_OK);
+  CHECK_STATUS(tandem_gpu_world_set_assets(world, &box, 1, NULL), TANDEM_OK);
+  CHECK_STATUS(tandem_world_set_assets(expected, &box, 1), TANDEM_OK);
+  CHECK_STATUS(tandem_gpu_world_set_bodies(world, &body, 1, NULL, &start), TANDEM_OK);
+  CHECK_STATUS(tandem_world_set_bodies(expected, &body, 1, NULL, &start), TANDEM_OK);
+  CHECK(tandem_gpu_world_mass(world, 0) == tandem_world_mass(expected, 0));
+  CHECK_STATUS(tandem_gpu_world_step(world, 1.0 / 60, 30), TANDEM_OK);
+  CHECK_STATUS(tandem_world_step(expected, 1.0 / 60, 30), TANDEM_OK);
+  CHECK(tandem_gpu_world_time(world) == tandem_world_time(expected));
+  const tandem_body_motion* moved = NULL;
+  CHECK_STATUS(tandem_gpu_world_bodies(world, &moved, NULL), TANDEM_OK);
+  const tandem_body_motion* theirs = tandem_world_bodies(expected, NULL);
+  for (int k = 0; k < 3; ++k) {
+    CHECK(fabs(moved->centre[k] - theirs->centre[k]) < 1e-9);
+    CHECK(fabs(moved->velocity[k] - theirs->velocity[k]) < 1e-9);
+    CHECK(fabs(moved->angular_velocity[k] - theirs->angular_velocity[k]) < 1e-9);
+    for (int j = 0; j < 3; ++j) CHECK(fabs(moved->pose.rotation[k][j] - theirs->pose.rotation[k][j]) < 1e-9);
+  }
+  tandem_gpu_world_destroy(world);
+  tandem_world_destroy(expected);
+}
+
+static void test_rest(void) {
+  tandem_gpu_world* world = world_of_boxes(NULL);
+  size_t count = 7;
+  const tandem_object_pair* touching = NULL;
+  const tandem_world_contact* contacts = (const tandem_world_contact*)&count;
+  CHECK_STATUS(tandem_gpu_world_contacts(world, &contacts, &count), TANDEM_OK);
+  CHECK(contacts == NULL && count == 0);
+  CHECK_STATUS(tandem_gpu_world_step(world, 1.0 / 60, 20), TANDEM_OK);
+  CHECK_STATUS(tandem_gpu_world_contacts(world, &contacts, &count), TANDEM_OK);
+  CHECK(count > 0);
+  for (size_t i = 0; i < count; ++i)
+    CHECK(contacts[i].a < contacts[i].b && contacts[i].b < kBodies && contacts[i].normal[2] > 0.9);
+  CHECK_STATUS(tandem_gpu_world_touching(world, &touching, &count), TANDEM_OK);
+  CHECK(count > 0 && touching[0].a == 0 && touching[0].b == 1);
+  const tandem_body_motion* bodies = bodies_of(world);
+  CHECK(fabs(bodies[1].centre[2] - 1) < 0.02 && bodies[0].centre[2] == 0);
+  tandem_gpu_world_destroy(world);
+}
+
+static void test_the_same_bytes_twice(void) {
+  tandem_gpu_body_state* first = NULL;
+  for (int run = 0; run < 2; ++run) {
+    tandem_gpu_world* world = world_of_boxes(NULL);
+    for (int i = 0; i < 60; ++i) CHECK_STATUS(tandem_gpu_world_step(world, 1.0 / 60, 1 + run), TANDEM_OK);
+    if (run == 0) CHECK_STATUS(tandem_gpu_world_step(world, 1.0 / 60, 60), TANDEM_OK);
+    tandem_gpu_body_state* states = copy_states(world);
+    if (run == 0) first = states;
+    CHECK(memcmp(states, first, kBodies * sizeof *states) == 0);
+    if (run == 1) free(states);
+    tandem_gpu_world_destroy(world);
+  }
+  free(first);
+}
+
+// What is written to the states moves the bodies.
+static void test_states_in_place(void) {
+  const tandem_world_options floating = {.struct_size = sizeof floating, .no_gravity = 1};
+  tandem_gpu_world* world = world_of_boxes(&floating);
+  CHECK_STATUS(tandem_gpu_world_step(world, 1.0 / 60, 60), TANDEM_OK);
+  tandem_gpu_body_state* const on_gpu = tandem_gpu_world_states(world, NULL);
+  tandem_gpu_body_state* states = copy_states(world);
+  const double before = states[8].position[2];
+  states[8].velocity[2] = 3;
+  cuda_must(cudaMemcpy(on_gpu, states, kBodies * sizeof *states, cudaMemcpyHostToDevice));
+  CHECK_STATUS(tandem_gpu_world_wake(world), TANDEM_OK);
+  CHECK_STATUS(tandem_gpu_world_step(world, 1.0 / 60, 60), TANDEM_OK);
+  CHECK(tandem_gpu_world_states(world, NULL) == on_gpu);
+  CHECK(fabs(bodies_of(world)[8].centre[2] - before - 3) < 1e-6);
+  free(states);
+  // A body is pushed, pulled and put elsewhere.
+  const double mass = tandem_gpu_world_mass(world, 8);
+  const double impulse[] = {0, 0, -3 * mass}, force[] = {0, mass, 0}, none[] = {0, 0, 0};
+  tandem_body_motion motion = bodies_of(world)[8];
+  CHECK_STATUS(tandem_gpu_world_push(world, 8, impulse, motion.centre), TANDEM_OK);
+  CHECK_STATUS(tandem_gpu_world_set_force(world, 8, force, none), TANDEM_OK);
+  CHECK_STATUS(tandem_gpu_world_step(world, 0.01, 100), TANDEM_OK);
+  CHECK(fabs(bodies_of(world)[8].velocity[1] - 1) < 1e-6 && fabs(bodies_of(world)[8].velocity[2]) < 1e-6);
+  motion.pose = at(5, 5, 5).pose;
+  memset(motion.velocity, 0, sizeof motion.velocity);
+  CHECK_STATUS(tandem_gpu_world_set_body(world, 8, &motion), TANDEM_OK);
+  CHECK(fabs(bodies_of(world)[8].centre[0] - 5) < 1e-9 && bodies_of(world)[8].velocity[1] == 0);
+  tandem_gpu_world_destroy(world);
+}
+
+static void test_wrong_calls(void) {
+  tandem_gpu_world* world = world_of_boxes(NULL);
+  tandem_instance bodies[2] = {at(0, 0, 0), at(0, 0, 2)};
+  const double none[] = {0, 0, 0}, much[] = {1e300, 0, 0};
+  size_t count = 7;
+  tandem_body_motion motion = bodies_of(world)[1];
+  CHECK_STATUS(tandem_gpu_world_step(world, 0, 1), TANDEM_BAD_DURATION);
+  CHECK_STATUS(tandem_gpu_world_push(world, kBodies, none, none), TANDEM_UNKNOWN_INSTANCE);
+  CHECK(tandem_gpu_world_where(world) == kBodies);
+  CHECK_STATUS(tandem_gpu_world_push(world, 1, much, none), TANDEM_OUT_OF_RANGE);
+  CHECK_STATUS(tandem_gpu_world_push(world, 1, NULL, none), TANDEM_NULL_ARGUMENT);
+  CHECK_STATUS(tandem_gpu_world_set_force(world, 1, much, none), TANDEM_OUT_OF_RANGE);
+  motion.pose.rotation[0][0] = 2;
+  CHECK_STATUS(tandem_gpu_world_set_body(world, 1, &motion), TANDEM_POSE_NOT_RIGID);
+  CHECK(tandem_gpu_world_where(world) == 1);
+  CHECK_STATUS(tandem_gpu_world_step(world, 1.0 / 60, 1), TANDEM_OK);
+  CHECK(tandem_gpu_world_where(world) == 0);
+  const double density[] = {1000, -1};
+  tandem_joint joint = {.kind = TANDEM_BALL, .a = 0, .b = 1};
+  tandem_body_start start = {.struct_size = sizeof start, .count = 2, .density = density};
+  CHECK_STATUS(tandem_gpu_world_set_bodies(world, bodies, 2, NULL, &start), TANDEM_NO_MASS);
+  CHECK(tandem_gpu_world_where(world) == 1);
+  CHECK(tandem_gpu_world_states(world, &count) == NULL && count == 0);
+  start = (tandem_body_start){.struct_size = sizeof start, .joints = &joint, .joint_count = 1};
+  CHECK_STATUS(tandem_gpu_world_set_bodies(world, bodies, 2, NULL, &start), TANDEM_BAD_OPTION);
+  bodies[1].asset = 1;
+  CHECK_STATUS(tandem_gpu_world_set_bodies(world, bodies, 2, NULL, NULL), TANDEM_UNKNOWN_ASSET);
+  CHECK_STATUS(tandem_gpu_world_set_bodies(world, NULL, 0, NULL, NULL), TANDEM_OK);
+  CHECK_STATUS(tandem_gpu_world_step(world, 1.0 / 60, 1), TANDEM_OK);
+  tandem_gpu_world_destroy(world);
+}
+
+// Bodies that are excluded pass through each other, and a kinematic one keeps its velocity.
+static void test_a_filter(void) {
+  static const uint8_t motion[] = {TANDEM_KINEMATIC, TANDEM_MOVING};
+  static const double speeds[] = {0, 0, 1, 0, 0, 0};
+  const tandem_world_options floating = {.struct_size = sizeof floating, .no_gravity = 1};
+  const tandem_instance bodies[] = {at(0, 0, 0), at(0, 0, 1.3)};
+  const tandem_object_pair pair = {0, 1};
+  const tandem_body_start start = {.struct_size = sizeof start, .count = 2, .velocity = speeds};
+  tandem_excluded_pairs* excluded = NULL;
+  tandem_gpu_world* world = NULL;
+  CHECK_STATUS(tandem_excluded_pairs_create(&pair, 1, NULL, &excluded), TANDEM_OK);
+  CHECK_STATUS(tandem_gpu_world_create(&floating, NULL, &world), TANDEM_OK);
+  CHECK_STATUS(tandem_gpu_world_set_assets(world, &box, 1, NULL), TANDEM_OK);
+  for (int is_excluded = 0; is_excluded < 2; ++is_excluded) {
+    const tandem_pair_filter filter = {.struct_size = sizeof filter,
+                                       .count = 2,
+                                       .motion = motion,
+                                       .excluded = is_excluded ? excluded : NULL};
+    const tandem_body_motion* moved = NULL;
+    CHECK_STATUS(tandem_gpu_world_set_bodies(world, bodies, 2, &filter, &start), TANDEM_OK);
+    CHECK_STATUS(tandem_gpu_world_step(world, 0.01, 100), TANDEM_OK);
+    CHECK_STATUS(tandem_gpu_world_bodies(world, &moved, NULL), TANDEM_OK);
+    CHECK(fabs(moved[0].centre[2] - 1) < 1e-9);
+    CHECK((moved[1].centre[2] == 1.3) == (is_excluded == 1));
+  }
+  tandem_excluded_pairs_destroy(excluded);
+  tandem_gpu_world_destroy(world);
+}
+
+int main(int argc, char** argv) {
+  if (argc != 2) return printf("usage: gpu_world_use_test ASSETS_FOLDER\n"), 1;
+  if (!has_gpu()) return printf("there is no GPU\n"), NO_GPU;
+  box = build_obj(argv[1], "box_12.obj", NULL);
+  test_a_fall_is_that_of_the_cpu();
+  test_rest();
+  test_the_same_bytes_twice();
+  test_states_in_place();
+  test_a_filter();
+  test_wrong_calls();
+  tandem_asset_release(box);
+  return failures != 0;
+}

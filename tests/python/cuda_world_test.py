@@ -1,0 +1,262 @@
+"""Worlds on a GPU: bodies move as on the CPU, states are given in place, and what is missing is named. Skipped where there is no GPU."""
+import gc
+import os
+import re
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import solids
+import tandem
+from meshes import needs_alarm
+
+cuda = pytest.importorskip("tandem.cuda", exc_type=ImportError)
+ROOT = Path(os.environ["TANDEM_SOURCE_DIR"])
+BOX = tandem.build(*solids.box(0.5, 0.5, 0.5))
+FLOOR = tandem.build(*solids.box(10, 10, 0.5))
+
+
+def has_gpu():
+    try:
+        tandem.World([], device="cuda")
+    except tandem.Error as error:
+        assert error.name == "NoGpu"
+        return False
+    return True
+
+
+needs_gpu = pytest.mark.skipif(not has_gpu(), reason="there is no GPU")
+
+
+@pytest.fixture
+def torch():
+    return pytest.importorskip("torch")
+
+
+def drop(count=30, **options):
+    """Turned boxes above a floor."""
+    places = np.stack(np.unravel_index(np.arange(count), (count, 3, 3))[::-1], axis=1) * 1.5 - [1.5, 1.5, -1.2]
+    turns = tandem.rotations(xyzw=np.random.default_rng(2).normal(size=(count, 4)))
+    return tandem.World([FLOOR, BOX], asset=[0] + count * [1], translation=[[0, 0, -0.5], *places], rotation=[np.eye(3), *turns],
+                        filter=tandem.Filter(motion=[tandem.FIXED] + count * [tandem.MOVING]), **{"device": "cuda", **options})
+
+
+def floating(**options):
+    return tandem.World([BOX], translation=[[0, 0, 0], [3, 0, 0]], gravity=[0, 0, 0], **{"device": "cuda", **options})
+
+
+def test_without_a_gpu_the_reason_is_told():
+    program = "import tandem\ntry:\n    tandem.World([], device='cuda')\nexcept tandem.Error as error:\n    print(error.name, error)"
+    told = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, env={**os.environ, "CUDA_VISIBLE_DEVICES": ""})
+    assert told.stdout.startswith("NoGpu there is no GPU"), told.stderr
+
+
+def test_continuous_motion_is_missing():
+    with pytest.raises(NotImplementedError, match="no continuous motion"):
+        tandem.World([BOX], continuous=True, device="cuda")
+
+
+@needs_gpu
+def test_a_device_that_there_is_not_is_named():
+    for make in (lambda: tandem.World([BOX], device="cuda:99"), lambda: tandem.Scene([BOX], device="cuda:99"), lambda: cuda.Query([BOX], device=99)):
+        with pytest.raises(ValueError, match="device is GPU 99 where 0 to"):
+            make()
+
+
+@needs_gpu
+def test_bodies_fall_as_on_the_cpu():
+    given = {"velocity": [[1, 0, 2], [0, 0, 0]], "angular_velocity": [[0, 0.5, 1], [3, 0, 0]], "density": [1000, 300], "gravity_scale": [1, 0.5]}
+    on_cpu, on_gpu = (tandem.World([BOX], translation=[[0, 0, 5], [3, 0, 5]], device=device, **given) for device in ("cpu", "cuda"))
+    for world in (on_cpu, on_gpu):
+        world.step(1 / 60, 30)
+    assert on_gpu.time == on_cpu.time and np.array_equal(on_gpu.mass, on_cpu.mass)
+    for name in ("translation", "rotation", "velocity", "angular_velocity"):
+        assert np.allclose(getattr(on_gpu, name), getattr(on_cpu, name), atol=1e-9)
+    assert on_gpu.bodies.dtype == tandem.BODY_MOTION and len(on_gpu.instances) == 2 and not on_gpu.sleeping.any()
+
+
+@needs_gpu
+def test_boxes_come_to_rest():
+    world = drop()
+    while not world.sleeping[1:].all() and world.time < 30:
+        world.step(1 / 60, 30)
+    assert world.sleeping[1:].all() and np.abs(world.velocity).max() < 0.03
+    assert 0.45 < world.translation[1:, 2].min() and world.translation[1:, 2].max() < 3
+    depth = tandem.Scene([FLOOR, BOX], world.instances).manifolds().manifolds["depth"]
+    assert len(depth) >= 30 and depth.max() < 0.01
+
+
+@needs_gpu
+def test_contacts_hold_bodies_up():
+    world = tandem.World([BOX], translation=[[0, 0, 0], [0, 0, 1]], filter=tandem.Filter(motion=[tandem.FIXED, tandem.MOVING]), sleeping=False, device="cuda")
+    world.step(1 / 60, 120)
+    contacts, touching = world.contacts, world.touching
+    assert contacts.dtype == tandem.WORLD_CONTACT and contacts["impulse"].sum(axis=0)[2] * 60 == pytest.approx(9810, rel=0.02)
+    assert touching.dtype == tandem.PAIR and touching.tolist() == [(0, 1)]
+
+
+@needs_gpu
+def test_the_same_bytes_however_steps_are_called():
+    worlds = [drop(), drop(), drop(threads=4)]
+    worlds[0].step(1 / 60, 60)
+    for _ in range(60):
+        worlds[1].step(1 / 60)
+    for _ in range(6):
+        worlds[2].step(1 / 60, 10)
+        worlds[2].contacts, worlds[2].touching
+    assert len({world.bodies.tobytes() + world.contacts.tobytes() for world in worlds}) == 1
+    worlds[0].step(1 / 60, 0)
+    assert worlds[0].time == worlds[1].time
+
+
+@needs_gpu
+def test_bodies_are_pushed_pulled_and_moved():
+    world = floating()
+    world.push(0, [0, 0, world.mass[0]])
+    world.set_force(1, [world.mass[1], 0, 0])
+    world.step(0.01, 100)
+    assert np.allclose(world.velocity, [[0, 0, 1], [1, 0, 0]], atol=1e-9)
+    world.move(0, translation=[0, 0, 9], velocity=[0, 1, 0])
+    assert np.allclose(world.translation[0], [0, 0, 9]) and np.allclose(world.velocity[0], [0, 1, 0])
+
+
+@needs_gpu
+def test_states_are_the_memory_of_the_steps(torch):
+    world = floating()
+    states = torch.from_dlpack(world.states)
+    assert states.shape == (2, 13) and states.dtype == torch.float64 and states.data_ptr() == world.states.pointer
+    assert np.allclose(states.cpu().numpy(), [[0, 0, 0, 1, 0, 0, 0] + 6 * [0], [3, 0, 0, 1, 0, 0, 0] + 6 * [0]])
+    world.step(1 / 60, 60)
+    assert world.sleeping.all()
+    states[0, 7:10] = torch.tensor([0.0, 0.0, 2.0], dtype=torch.float64)
+    states[1, 0] = 5
+    torch.cuda.synchronize()
+    world.wake()
+    assert not world.sleeping.any()
+    world.step(0.01, 50)
+    assert np.allclose(world.translation, [[0, 0, 1], [5, 0, 0]], atol=1e-9)
+    assert states.cpu().numpy()[0, 2] == pytest.approx(1)  # the steps wrote there
+
+
+@needs_gpu
+def test_states_by_the_array_interface():
+    cupy = pytest.importorskip("cupy")
+    world = floating()
+    states = cupy.asarray(world.states)
+    assert states.shape == (2, 13) and states.data.ptr == world.states.pointer
+    assert states[1, :3].get().tolist() == [3, 0, 0]
+
+
+@needs_gpu
+def test_states_outlive_bodies_and_worlds(torch):
+    world = floating()
+    first = torch.from_dlpack(world.states)
+    world.place(translation=[[0, 0, 7]])
+    assert torch.from_dlpack(world.states).shape == (1, 13) and world.states.pointer != first.data_ptr()
+    world.step(1 / 60, 10)
+    assert first.cpu().numpy()[1, 0] == 3
+    second = torch.from_dlpack(world.states)
+    del world
+    gc.collect()
+    drop().step(1 / 60, 10)
+    assert first.cpu().numpy()[1, 0] == 3 and second.cpu().numpy()[0, 2] == 7
+
+
+@needs_gpu
+def test_no_bodies():
+    world = tandem.World([BOX], device="cuda")
+    world.step(1 / 60, 3)
+    world.wake()
+    assert len(world.bodies) == len(world.contacts) == len(world.touching) == len(world.mass) == 0 and world.states.shape == (0, 13)
+    world.place(translation=[0, 0, 1]).step(1 / 60)
+    assert world.translation[0, 2] < 1
+    world.place(translation=np.zeros((0, 3))).step(1 / 60)
+    assert len(world.bodies) == 0
+
+
+@needs_gpu
+@pytest.mark.parametrize("call, missing", [
+    (lambda w: w.place(translation=np.zeros(3), joints=[tandem.Joint("ball", None, 0, anchor=[0, 0, 0])]), "joints"),
+    (lambda w: w.add_joint(tandem.Joint("ball", None, 0, anchor=[0, 0, 0])), "joints"),
+    (lambda w: w.remove_joint(0), "joints"),
+    (lambda w: w.set_motor(0, 1, 1), "joints"),
+    (lambda w: w.joints, "joints"),
+    (lambda w: w.broken, "joints"),
+    (lambda w: w.save(), r"save\(\)"),
+    (lambda w: w.restore(tandem.World([BOX]).save()), r"restore\(\)"),
+    (lambda w: w.began, "began"),
+    (lambda w: w.ended, "ended"),
+    (lambda w: w.set_material(0, friction=1), r"set_material\(\)"),
+    (lambda w: w.set_gravity_scale(0, 1), r"set_gravity_scale\(\)"),
+])
+def test_what_is_missing_is_named(call, missing):
+    world = floating()
+    with pytest.raises(NotImplementedError, match=f"a world on a GPU has no {missing} yet"):
+        call(world)
+    world.step(1 / 60)
+    assert len(world.bodies) == 2
+
+
+@needs_gpu
+@pytest.mark.parametrize("call, words", [
+    (lambda w: w.place(translation=np.zeros((2, 3)), density=[1, 0]), "instance 1: .*density"),
+    (lambda w: w.place(translation=[[0, 0, 0], [0, np.nan, 0]]), "instance 1: .*translation is not finite"),
+    (lambda w: w.place(translation=np.zeros(3), filter=tandem.Filter(excluded=[[0, 5]])), "pair 0"),
+    (lambda w: tandem.World([BOX, tandem.build(*solids.box(1, 1, 1), topology=False)], device="cuda"), "asset 1"),
+    (lambda w: w.push(1, [0, 0, np.nan]), "not finite"),
+    (lambda w: w.set_force(1, [1e300, 0, 0]), "instance 1: .*too large"),
+    (lambda w: w.move(1, rotation=3 * np.eye(3)), "instance 1: .*scales by 3"),
+])
+def test_wrong_calls_say_what_is_wrong(call, words):
+    with pytest.raises(tandem.Error, match=words):
+        call(floating())
+
+
+@needs_gpu
+def test_a_second_thread_is_refused_and_others_run():
+    world, refused, done = drop(), [], threading.Event()
+
+    def work():
+        world.step(1 / 240, 200)
+        done.set()
+
+    worker = threading.Thread(target=work)
+    worker.start()
+    while not done.is_set():
+        try:
+            world.translation
+        except RuntimeError as error:
+            refused.append(str(error))
+    worker.join()
+    assert set(refused) == {"another thread is in a call of this world"}
+
+
+@needs_gpu
+@needs_alarm
+def test_ctrl_c_ends_many_steps():
+    world = drop(4, sleeping=False)
+    signal.signal(signal.SIGALRM, signal.default_int_handler)
+    signal.setitimer(signal.ITIMER_REAL, 0.5)
+    start = time.monotonic()
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            world.step(1 / 60, 2**40)
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, signal.SIG_DFL)
+    assert time.monotonic() - start < 5 and world.time > 0
+    world.step(1 / 60)
+
+
+@needs_gpu
+def test_the_example_of_the_page_runs(capsys, monkeypatch):
+    monkeypatch.chdir(ROOT)
+    example, shown = re.search(r"^## On a GPU$.*?^```python\n(.*?)^```\n```\n(.*?)^```$", (ROOT / "docs/dynamics.md").read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL).groups()
+    exec(compile(example, "docs/dynamics.md", "exec"), {})
+    assert capsys.readouterr().out == shown

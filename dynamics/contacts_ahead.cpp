@@ -27,6 +27,7 @@ void ContactsAhead::find_near(const BodiesAhead& of) {
     Apart& now = now_apart_.emplace_back(Apart{{pair}});
     if (before != apart_.end() && before->pair == pair)
       now.distance = before->distance - between(pair) * (1 + 1e-9);
+    now.distance = std::max(now.distance, least_distance(of, pair));
     const PairReach reach = reach_of(of, pair, now.distance);
     now.reach = reach.reach, now.slow = reach.is_slow;
     if (reach.is_near && reach.is_slow) slow_.push_back(pair);

@@ -64,6 +64,13 @@ struct PairReach {
   bool is_fast;  ///< it may meet, is not slow, and is not surely apart now
 };
 
+/// Returns by how much bodies are apart at least, for all that balls around them say.
+TANDEM_HD inline double least_distance(const BodiesAhead& of, const ObjectPair& pair) {
+  const double centres = norm(of.states[pair.b].position - of.states[pair.a].position);
+  return centres - of.bodies[pair.a].radius - of.bodies[pair.b].radius -
+         pair_ahead_detail::rounding_of(of, pair);
+}
+
 /// distance: by which the bodies are apart at least.
 TANDEM_HD inline PairReach reach_of(const BodiesAhead& of, const ObjectPair& pair, double distance) {
   using namespace pair_ahead_detail;

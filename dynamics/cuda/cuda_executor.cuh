@@ -68,6 +68,11 @@ struct ValueOrZero {
 /// allocates, but for arrays and where the room for sums and sorting is made. After an error it does nothing
 /// more.
 class CudaExecutor {
+  struct Later {
+    void* to;
+    std::size_t bytes;
+  };
+
  public:
   template <typename T>
   class Array {
@@ -81,7 +86,51 @@ class CudaExecutor {
     GpuArray<T> array_;
   };
 
+  /// Calls that are queued as one graph when they come for the third time.
+  class Sequence {
+   public:
+    Sequence() = default;
+    Sequence(const Sequence&) = delete;
+    Sequence& operator=(const Sequence&) = delete;
+    ~Sequence() { forget(); }
+
+   private:
+    friend CudaExecutor;
+    void forget() {
+      if (graph_ != nullptr) static_cast<void>(cudaGraphExecDestroy(graph_));
+      graph_ = nullptr;
+      times_ = 0;
+    }
+
+    std::uint64_t key_ = 0;
+    std::uint32_t times_ = 0;  // that they were queued one by one
+    cudaGraphExec_t graph_ = nullptr;
+    std::vector<Later> later_;
+  };
+
   explicit CudaExecutor(cudaStream_t stream = nullptr) : stream_(stream) {}
+
+  /// See HostExecutor. Condition: no copies are waited for; the stream is one that can be captured.
+  template <typename Enqueue>
+  void again(Sequence& sequence, std::uint64_t key, const Enqueue& enqueue) {
+    constexpr std::uint32_t kTimesBefore =
+        2;  // what is queued but once needs no graph; and kernels are loaded
+    if (sequence.key_ != key) sequence.forget();
+    sequence.key_ = key;
+    if (sequence.graph_ == nullptr) {
+      if (sequence.times_++ < kTimesBefore) return enqueue();
+      cudaGraph_t graph = nullptr;
+      if (error_ == cudaSuccess) take(cudaStreamBeginCapture(stream_, cudaStreamCaptureModeThreadLocal));
+      if (error_ != cudaSuccess) return;
+      enqueue();
+      take(cudaStreamEndCapture(stream_, &graph));
+      if (error_ == cudaSuccess) take(cudaGraphInstantiate(&sequence.graph_, graph, 0));
+      if (graph != nullptr) static_cast<void>(cudaGraphDestroy(graph));
+      sequence.later_ = std::move(later_);
+    }
+    later_ = sequence.later_;
+    if (error_ == cudaSuccess) take(cudaGraphLaunch(sequence.graph_, stream_));
+  }
 
   cudaStream_t stream() const { return stream_; }
   void set_stream(cudaStream_t stream) { stream_ = stream; }
@@ -221,10 +270,6 @@ class CudaExecutor {
     return cub::DeviceScan::ExclusiveSum(scratch, bytes, in, sums, most + 1, stream_);
   }
 
-  struct Later {
-    void* to;
-    std::size_t bytes;
-  };
   static constexpr std::size_t kMostValues = 8, kMostBytesOfValue = 256;
 
   std::vector<Later> later_;

@@ -25,6 +25,7 @@ struct GpuWorld::Parts {
   DeviceAssets files;
   std::vector<double> inner_radii;
   std::vector<AssetBox> boxes;
+  cudaStream_t own_stream = nullptr;
   CudaExecutor executor;
   CudaQuestions questions{executor};
   std::optional<ParallelSimulation<CudaExecutor, CudaQuestions>> simulation;
@@ -44,6 +45,13 @@ struct GpuWorld::Parts {
   std::vector<ContactImpulse> done;
   std::vector<WorldContact> contacts;
   std::vector<ObjectPair> touching;
+
+  Parts() = default;
+  Parts(const Parts&) = delete;
+  Parts& operator=(const Parts&) = delete;
+  ~Parts() {
+    if (own_stream != nullptr) static_cast<void>(cudaStreamDestroy(own_stream));
+  }
 
   bool has_bodies() const { return simulation.has_value() && !properties.empty(); }
   void clear() {
@@ -89,6 +97,12 @@ Status GpuWorld::set_assets(std::span<const AssetView> assets, cudaStream_t stre
   if (const Status status = scene.set_assets(assets); status != Status::kOk)
     return fail(status, scene.where());
   try {
+    // The default stream cannot be captured into a graph; one of its own waits for that, and it for this.
+    if (stream == nullptr && parts.own_stream == nullptr) {
+      const Status status = status_of(cudaStreamCreate(&parts.own_stream));
+      if (status != Status::kOk) return fail(status);
+    }
+    stream = stream != nullptr ? stream : parts.own_stream;
     parts.executor.set_stream(stream);
     if (const Status status = parts.files.upload(assets, Contents::all, stream); status != Status::kOk)
       return fail(status);

@@ -38,7 +38,17 @@ class HostExecutor {
     std::vector<T> elements_;
   };
 
+  /// Calls that are queued together, again and again.
+  struct Sequence {};
+
   explicit HostExecutor(Threads& threads) : threads_(threads) {}
+
+  /// Does what enqueue() does. key: equal where it queues the very same calls as before.
+  template <typename Enqueue>
+  void again(Sequence&, std::uint64_t key, const Enqueue& enqueue) {
+    static_cast<void>(key);
+    enqueue();
+  }
 
   /// Makes room for sums and sorting of so many.
   Status reserve(std::uint32_t most) {

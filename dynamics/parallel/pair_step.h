@@ -94,6 +94,7 @@ TANDEM_HD inline void plan_pair(const StepArrays& a, std::uint32_t at, const Obj
   plan.before = before;
   plan.is_idle = of.is_idle(pair.a) && of.is_idle(pair.b);
   if (!is_near) return;
+  record.apart = std::max(record.apart, least_distance(of, pair));
   const PairReach reach = reach_of(of, pair, record.apart);
   plan.reach = reach.reach, plan.is_slow = reach.is_slow;
   plan.is_in_reach = reach.is_near, plan.is_fast = reach.is_fast;

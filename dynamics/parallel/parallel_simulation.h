@@ -61,7 +61,7 @@ class ParallelSimulation {
   Status set_bodies(const ParallelBodies& bodies, const ParallelOptions& options) {
     bodies_ = static_cast<std::uint32_t>(bodies.properties.size());
     options_ = options;
-    within_ = 0, has_forces_ = false;
+    within_ = 0, has_forces_ = false, ++generation_;
     most_pairs_ = most_moved_ = most_found_ = most_remembered_ = 0;
     for (Status status : {reserve_bodies(bodies), reserve_pairs(std::max(1024u, 8 * bodies_)),
                           reserve_moved(std::max(256u, bodies_ / 2)),
@@ -75,14 +75,19 @@ class ParallelSimulation {
   /// body; or what a question says. After an error bodies and contacts are as before the step.
   Status step(double dt) {
     constexpr int kMostRepeats = 12;
+    if (dt != dt_) dt_ = dt, ++generation_;
     for (int repeat = 0; repeat < kMostRepeats; ++repeat) {
       bool whole = true;
       const StepArrays a = arrays(dt);
       const Status status = try_step(a, whole);
       if (status != Status::kOk) return status;
       if (!whole) continue;
-      PairStep<Executor, Questions>{to_, ask_, a}.finish();
-      sleep_step(to_, a, options_.sleep);
+      queue(kFinish, [&] {
+        PairStep<Executor, Questions>{to_, ask_, a}.finish();
+        sleep_step(to_, a, options_.sleep);
+        to_.for_each(nullptr, bodies_, parallel_simulation_detail::StatesGoOn{a.before, a.start, a.end});
+        to_.once(parallel_simulation_detail::CountsGoOn{a.counts});
+      });
       return go_on();
     }
     return Status::kOutOfMemory;
@@ -95,7 +100,7 @@ class ParallelSimulation {
     BodyForce before;
     if (status == Status::kOk) status = to_.copy(forces_.data() + body, std::span(&before, 1));
     if (status != Status::kOk) return status;
-    has_forces_ = true;
+    if (!has_forces_) has_forces_ = true, ++generation_;
     is_new = !(before == force);
     return to_.copy(std::span<const BodyForce>(&force, 1), forces_.data() + body);
   }
@@ -138,22 +143,41 @@ class ParallelSimulation {
   template <typename T>
   using Array = typename Executor::template Array<T>;
 
+  // Parts of a step that are queued together.
+  enum Part { kFind, kAddMissed, kSolve, kFinish, kParts };
+
+  template <typename Enqueue>
+  void queue(Part part, const Enqueue& enqueue) {
+    to_.again(sequences_[part][parity_], generation_, enqueue);
+  }
+
   Status try_step(const StepArrays& a, bool& whole) {
     constexpr int kMostTimes = 3;  // as of Simulation
     PairStep<Executor, Questions> step{to_, ask_, a};
-    ask_.forget_needs();
-    step.find_contacts(within_);
-    for (int times = 1;; ++times) {
+    queue(kFind, [&] {
+      ask_.forget_needs();
+      step.find_contacts(within_);
       solve(step.a);
       step.find_surprised();
+      queue_reading();
+    });
+    for (int times = 1;; ++times) {
       const Status status = read(whole);
       if (status != Status::kOk || !whole) return status;
       if (read_.bad_body != kNoIndex) return Status::kOutOfRange;
       if (times == kMostTimes || read_.surprised == 0) return Status::kOk;
-      ask_.forget_needs();
-      step.add_missed();
+      queue(kAddMissed, [&] {
+        ask_.forget_needs();
+        step.add_missed();
+        queue_reading();
+      });
       const Status missed = read(whole);
       if (missed != Status::kOk || !whole || read_.missed == 0) return missed;
+      queue(kSolve, [&] {
+        solve(step.a);
+        step.find_surprised();
+        queue_reading();
+      });
     }
   }
 
@@ -164,12 +188,14 @@ class ParallelSimulation {
                  a.options, {a.end, a.impulses, a.done});
   }
 
+  void queue_reading() {
+    to_.copy_later(counts_.data(), read_);
+    to_.copy_later(solver_.needs(), solver_needs_);
+    ask_.read_needs();
+  }
+
   // Reads the counts, and makes room where there is too little: then the step is not whole.
   Status read(bool& whole) {
-    SoftStepNeeds solver = {};
-    to_.copy_later(counts_.data(), read_);
-    to_.copy_later(solver_.needs(), solver);
-    ask_.read_needs();
     Status status = to_.wait();
     bool grew = false;
     if (status == Status::kOk) status = ask_.make_room(grew);
@@ -188,22 +214,22 @@ class ParallelSimulation {
       grew = true;
       status = reserve_contacts(read_.found + read_.found / 4, read_.remembered + read_.remembered / 4);
     }
-    if (status == Status::kOk && !grew && solver.has_room == 0) {
+    if (status == Status::kOk && !grew && solver_needs_.has_room == 0) {
       grew = true;
-      status = solver_.reserve(
-          to_, {bodies_, most_pairs_, solver.groups + solver.groups / 4, solver.rows + solver.rows / 4});
+      status = solver_.reserve(to_, larger_room(solver_.room(), solver_needs_));
     }
     whole = !grew;
+    if (grew) ++generation_;
     return status;
   }
 
   // The results of a step become what the next one begins with.
   Status go_on() {
-    const StepArrays a = arrays();
-    to_.for_each(nullptr, bodies_, parallel_simulation_detail::StatesGoOn{a.before, a.start, a.end});
+    constexpr double kWide = 3;
     std::swap(records_[0], records_[1]), std::swap(remembered_[0], remembered_[1]);
-    within_ = 1.25 * read_.reach.farthest(0.5 * options_.solver.slop);
-    to_.once(parallel_simulation_detail::CountsGoOn{counts_.data()});
+    parity_ = 1 - parity_;
+    const double needed = read_.reach.farthest(0.5 * options_.solver.slop);
+    if (kWide * needed < within_) within_ = 1.5 * needed, ++generation_;
     return to_.status();
   }
 
@@ -294,6 +320,11 @@ class ParallelSimulation {
   double within_ = 0;  // how far apart near pairs are
   bool has_forces_ = false;
   StepCounts read_ = {};
+  SoftStepNeeds solver_needs_ = {};
+  double dt_ = 0;
+  std::uint64_t generation_ = 0;  // of all that is queued, memory included
+  int parity_ = 0;                // of the step: records change places
+  typename Executor::Sequence sequences_[kParts][2];
 
   // See StepArrays.
   Array<BodyProperties> properties_, acting_;

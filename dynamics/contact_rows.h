@@ -194,7 +194,7 @@ TANDEM_HD ContactPatch RowMaker::patch_of(const Contacts& contacts, std::size_t 
 // that is much.
 TANDEM_HD inline double RowMaker::separation_of(const ContactPoint& contact, const ContactPatch& patch,
                                                 const ContactMeeting& meeting) const {
-  constexpr double kFasterOfMiddle = 2, kRound = 0.7, kOfSlop = 0.25, kFaster = 4, kLeast = 0.3;
+  constexpr double kFasterOfMiddle = 2, kPassed = 3, kRound = 0.7, kOfSlop = 0.25, kFaster = 4, kLeast = 0.3;
   // What comes out by itself is not pushed out.
   const double depth = std::min(contact.depth, depth_at_start(contact, meeting));
   const double separation = depth < 0 ? -depth : std::min(0.0, step_.options.slop - depth);
@@ -205,13 +205,20 @@ TANDEM_HD inline double RowMaker::separation_of(const ContactPoint& contact, con
   };
   const double turning = step_.dt * (step_.bodies[contact.body_a].radius * norm(spin_a) +
                                      step_.bodies[contact.body_b].radius * norm(spin_b));
-  if (contact.time > 0 && turning > kFastFrom * step_.options.slop)
-    return separation + std::max(0.0, kFasterOfMiddle * comes_down(patch.centre));
+  // A point that the bodies roll past within a few steps goes down and comes up again. Others may come as
+  // deep as the patch is, or into the slop: what stays deeper is pushed out again, and that gains energy.
   const ContactPoint& deepest = *patch.deepest;
+  const bool is_passed = norm(contact.position - patch.centre) < kPassed * turning;
+  const double deeper = std::max(step_.options.slop, deepest.depth) - depth;
+  const auto with = [&](double allowed) {
+    return is_passed ? separation + allowed : std::max(separation, std::min(separation + allowed, deeper));
+  };
+  if (contact.time > 0 && turning > kFastFrom * step_.options.slop)
+    return with(std::max(0.0, kFasterOfMiddle * comes_down(patch.centre)));
   if (deepest.depth - contact.depth < kRound * std::max(deepest.depth, kOfSlop * step_.options.slop))
     return separation;
   const double allowed = kFaster * comes_down(deepest.position);
-  return allowed > kLeast * step_.options.slop ? separation + allowed : separation;
+  return allowed > kLeast * step_.options.slop ? with(allowed) : separation;
 }
 
 // The velocity of a body's point if contacts do not move the body, else 0.

@@ -519,4 +519,20 @@ TEST(World, ContinuousMotionLetsPlatesSlide) {
   }
 }
 
+// Their edges land in turn, and what pushes an edge out again must not keep them rolling.
+TEST(World, CoarseBodiesThatRollComeToRest) {
+  for (const Mesh& mesh : {cup(12, 0.15F, 0.3F, 0.03F), sphere(0.2, 2)}) {
+    WorldOnGround scene(mesh);
+    RandomPoses random(7);
+    for (int i = 0; i < 8; ++i) {
+      BodyDescription& body = scene.add(any_motion(random, 0.01));
+      body.pose.translation[0] += 2 * i - 8, body.pose.translation[2] += 0.4;
+      body.velocity[1] = 0.5 + 0.1 * i;
+    }
+    World& world = scene.begin();
+    ASSERT_EQ(world.step(kStep, 1500), Status::kOk);
+    for (const BodyMotion& body : world.bodies().subspan(1)) EXPECT_TRUE(body.sleeps);
+  }
+}
+
 }  // namespace tandem::test

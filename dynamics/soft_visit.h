@@ -118,8 +118,9 @@ class PairVisit {
   template <typename Ready = Nothing>
   TANDEM_INLINE void start(const Ready& ready = {}) {
     const TurningRow turning = turning_row();
-    for_contacts<1>([&](std::uint32_t i) { return unmade_row(i); }, ready,
-                    [&](std::uint32_t i, const UnmadeRow& unmade) { start(i, unmade, turning); });
+    for_contacts<kFrictionsAhead>(
+        [&](std::uint32_t i) { return unmade_row(i); }, ready,
+        [&](std::uint32_t i, const UnmadeRow& unmade) { start(i, unmade, turning); });
     turn(turning, taken<L>(turning_.impulse, lane_));
   }
 
@@ -288,7 +289,7 @@ class PairVisit {
   // So many rows of contacts a visit keeps in registers. A GPU waits for memory once for all of them; the CPU
   // reads ahead by itself.
 #ifdef __CUDA_ARCH__
-  static constexpr std::uint32_t kNormalsAhead = 2, kFrictionsAhead = 2;
+  static constexpr std::uint32_t kNormalsAhead = 4, kFrictionsAhead = 2;
 #else
   static constexpr std::uint32_t kNormalsAhead = 1, kFrictionsAhead = 1;
 #endif
@@ -344,8 +345,9 @@ class PairVisit {
       ready();
       for (std::uint32_t i = 0; i < contacts_; ++i) visit(i, read(i));
     } else {
-      // Loops over `rows` are unrolled, so that these are registers.
-      decltype(read(0)) rows[kAhead];
+      // Loops over `rows` are unrolled, so that these are registers. They begin as 0: a compiler keeps a
+      // register for ever that is only set under a condition.
+      decltype(read(0)) rows[kAhead] = {};
       TANDEM_UNROLL
       for (std::uint32_t k = 0; k < kAhead; ++k) {
         if (k < contacts_) rows[k] = read(k);

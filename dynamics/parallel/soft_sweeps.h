@@ -190,7 +190,7 @@ TANDEM_HD inline void visit_lane(const SoftSweeps& all, std::uint32_t number, co
   const SoftTurns& turns = all.turns[group];
   const Side sides[2] = {side_of(turns, 0, lane, number), side_of(turns, 1, lane, number)};
   PairVisit<OneLane> pair(all.rows, group, lane);
-  MotionOf<OneLane> moved[2];
+  MotionOf<OneLane> moved[2] = {};
   visit(all, sweep, pair, moved, [&] {
     const PairMotions motions = wait_for(all, sweep, sides);
     pair.begin(lanes_of(motions.velocities[0]), lanes_of(motions.velocities[1]));

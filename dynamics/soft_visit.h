@@ -5,7 +5,9 @@
 
 #ifdef __CUDACC__
 #define TANDEM_INLINE TANDEM_HD inline
+#define TANDEM_UNROLL _Pragma("unroll")
 #else
+#define TANDEM_UNROLL
 #include "kernels/common/lanes.h"
 #ifndef TANDEM_INLINE
 #define TANDEM_INLINE inline
@@ -85,7 +87,14 @@ template <typename L>
 struct MotionOf {
   Vector3Of<L> centre, spin;
 };
-// The bodies of as many pairs as there are lanes, from `lane` on.
+
+/// Does nothing.
+struct Nothing {
+  TANDEM_INLINE void operator()() const {}
+};
+
+/// The bodies of as many pairs as there are lanes, from `lane` on. A visit calls ready() when it has read all
+/// that it can before it knows how the bodies move; it has begun after that.
 template <typename L>
 class PairVisit {
  public:
@@ -106,73 +115,120 @@ class PairVisit {
   TANDEM_INLINE const MotionOf<L>& a() const { return a_; }
   TANDEM_INLINE const MotionOf<L>& b() const { return b_; }
 
-  TANDEM_INLINE void start() {
-    for (std::uint32_t i = 0; i < contacts_; ++i) {
-      SoftFriction& row = friction(i);
-      make_rows(normal(i), row);
-      push(direction(normal(i).direction), take(normal(i).impulse));
-      push(direction(row.first), take(row.first_impulse));
-      push(direction(row.second), take(row.second_impulse));
-    }
-    turn(taken<L>(turning_.impulse, lane_));
+  template <typename Ready = Nothing>
+  TANDEM_INLINE void start(const Ready& ready = {}) {
+    const TurningRow turning = turning_row();
+    for_contacts<kFrictionsAhead>(
+        [&](std::uint32_t i) { return unmade_row(i); }, ready,
+        [&](std::uint32_t i, const UnmadeRow& unmade) { start(i, unmade, turning); });
+    turn(turning, taken<L>(turning_.impulse, lane_));
   }
 
-  TANDEM_INLINE void push_apart() {
+  template <typename Ready = Nothing>
+  TANDEM_INLINE void push_apart(const Ready& ready = {}) {
     const L none{}, one = all_of<L>(1), inverse_h = all_of<L>(rows_.inverse_h);
     const L fastest = all_of<L>(-kFastestPush);
     const L bias_rate = take(pairs_.bias_rate), mass_scale = take(pairs_.mass_scale),
             impulse_scale = take(pairs_.impulse_scale);
-    for_normals([&](std::uint32_t i, const NormalRow& row) {
-      const L deep = smaller(none, is_opposed_ ? row.followed + take(gap(i).opposed) : row.followed);
-      const auto is_gap = less(none, row.followed);
-      const L bias = select(is_gap, row.followed * inverse_h, larger(bias_rate * deep, fastest));
-      visit(i, row, bias, select(is_gap, one, mass_scale), select(is_gap, none, impulse_scale));
-    });
+    struct Row {
+      NormalRow normal;
+      L opposed;
+    };
+    for_contacts<kNormalsAhead>(
+        [&](std::uint32_t i) {
+          return Row{normal_row(i), is_opposed_ ? take(gap(i).opposed) : none};
+        },
+        ready,
+        [&](std::uint32_t i, const Row& row) {
+          const L followed = row.normal.followed;
+          const L deep = smaller(none, is_opposed_ ? followed + row.opposed : followed);
+          const auto is_gap = less(none, followed);
+          const L bias = select(is_gap, followed * inverse_h, larger(bias_rate * deep, fastest));
+          visit(i, row.normal, bias, select(is_gap, one, mass_scale), select(is_gap, none, impulse_scale));
+        });
   }
 
   // a, b: how far the bodies have moved at this time.
   TANDEM_INLINE void follow(float time, const MotionOf<L>& a, const MotionOf<L>& b) {
     for (std::uint32_t i = 0; i < contacts_; ++i) {
       SoftNormal& row = normal(i);
-      const Direction along = direction(row.direction);
-      put(take(gap(i).separation) + speed(along, a, b) + time * take(row.drive), row.followed, lane_);
+      put(followed(take(gap(i).separation), direction(row.direction), take(row.drive), time, a, b),
+          row.followed, lane_);
     }
   }
 
-  TANDEM_INLINE void relax() {
-    const L none{}, one = all_of<L>(1), inverse_h = all_of<L>(rows_.inverse_h);
-    for_normals([&](std::uint32_t i, const NormalRow& row) {
-      visit(i, row, larger(none, row.followed * inverse_h), one, none);
-    });
+  // Does follow() and relax() at once. a, b: as in follow(), once the visit is ready.
+  template <typename Ready>
+  TANDEM_INLINE void follow_and_relax(float time, const MotionOf<L>& a, const MotionOf<L>& b,
+                                      const Ready& ready) {
+    for_contacts<kNormalsAhead>([&](std::uint32_t i) { return normal_row(i, gap(i).separation); }, ready,
+                                [&](std::uint32_t i, NormalRow row) {
+                                  row.followed = followed(row.followed, row.along, row.drive, time, a, b);
+                                  put(row.followed, normal(i).followed, lane_);
+                                  relax(i, row);
+                                });
+  }
+
+  template <typename Ready = Nothing>
+  TANDEM_INLINE void relax(const Ready& ready = {}) {
+    for_contacts<kNormalsAhead>([&](std::uint32_t i) { return normal_row(i); }, ready,
+                                [&](std::uint32_t i, const NormalRow& row) { relax(i, row); });
   }
 
   // Friction that was 0 stays 0 while nothing pushes.
-  TANDEM_INLINE void rub() {
+  template <typename Ready = Nothing>
+  TANDEM_INLINE void rub(const Ready& ready = {}) {
     const L none{};
     L all{};
-    for (std::uint32_t i = 0; i < contacts_; ++i) {
-      SoftFriction& row = friction(i);
-      const L push = take(normal(i).impulse);
-      all = all + push;
-      const L before = larger(magnitude(take(row.first_impulse)), magnitude(take(row.second_impulse)));
-      if (any(less(none, larger(push, before)))) rub(row, push);
+    const auto add = [&](std::uint32_t i, const Pushed& pushed, const auto& read_row) {
+      all = all + pushed.normal;
+      const L before = larger(magnitude(pushed.first), magnitude(pushed.second));
+      if (any(less(none, larger(pushed.normal, before)))) rub(friction(i), pushed, read_row());
+    };
+    const auto resist = [&](const Vector3Of<L>& impulse, const auto& read_turning) {
+      if (any(less(none, larger(all, dot(impulse, impulse))))) resist_turning(all, impulse, read_turning());
+    };
+    if constexpr (kFrictionsAhead == 1) {
+      ready();
+      for (std::uint32_t i = 0; i < contacts_; ++i) add(i, pushed(i), [&] { return friction_row(i); });
+      resist(taken<L>(turning_.impulse, lane_), [&] { return turning_row(); });
+    } else {
+      struct Row {
+        Pushed pushed;
+        FrictionRow friction;
+      };
+      const TurningRow turning = turning_row();
+      const Vector3Of<L> impulse = taken<L>(turning_.impulse, lane_);
+      for_contacts<kFrictionsAhead>(
+          [&](std::uint32_t i) {
+            return Row{pushed(i), friction_row(i)};
+          },
+          ready, [&](std::uint32_t i, const Row& row) { add(i, row.pushed, [&] { return row.friction; }); });
+      resist(impulse, [&] { return turning; });
     }
-    const Vector3Of<L> turning = taken<L>(turning_.impulse, lane_);
-    if (any(less(none, larger(all, dot(turning, turning))))) resist_turning(all);
   }
 
-  TANDEM_INLINE void rebound() {
+  template <typename Ready = Nothing>
+  TANDEM_INLINE void rebound(const Ready& ready = {}) {
+    struct Row {
+      NormalRow normal;
+      L wanted, sum_of_normal;
+    };
     const L none{}, one = all_of<L>(1);
-    for (std::uint32_t i = 0; i < contacts_; ++i) {
-      const NormalRow row = normal_row(i);
-      const L wanted = take(gap(i).rebound);
-      const L next = next_impulse(row, -wanted, one, none);
-      const L change = select(less(none, wanted),
-                              select(less(none, take(gap(i).strongest)), next - row.impulse, none), none);
-      push(row.along, change);
-      put(row.impulse + change, normal(i).impulse, lane_);
-      put(take(friction(i).sum_of_normal) + change, friction(i).sum_of_normal, lane_);
-    }
+    for_contacts<kNormalsAhead>(
+        [&](std::uint32_t i) {
+          return Row{normal_row(i), take(gap(i).rebound), take(friction(i).sum_of_normal)};
+        },
+        ready,
+        [&](std::uint32_t i, const Row& row) {
+          const L next = next_impulse(row.normal, -row.wanted, one, none);
+          const L change =
+              select(less(none, row.wanted),
+                     select(less(none, row.normal.strongest), next - row.normal.impulse, none), none);
+          push(row.normal.along, change);
+          put(row.normal.impulse + change, normal(i).impulse, lane_);
+          put(row.sum_of_normal + change, friction(i).sum_of_normal, lane_);
+        });
   }
 
   // Finds what another visit of the rows would change.
@@ -210,70 +266,152 @@ class PairVisit {
   struct NormalRow {
     Direction along;
     L mass, drive, followed, impulse;
+    L strongest;  // where a pair of the group bounces
+  };
+  struct FrictionRow {
+    Direction first, second;
+    L mass, coefficient, first_drive, second_drive, sum_of_normal, sum_of_first, sum_of_second;
+  };
+  // The impulses of a contact.
+  struct Pushed {
+    L normal, first, second;
+  };
+  struct TurningRow {
+    Vector3Of<L> spread_a[3], spread_b[3], drive;
+    L mass, lever;
+  };
+  // What make_rows() reads.
+  struct UnmadeRow {
+    Vector3Of<L> normal, first, second, arm_a, arm_b, velocity, impulse;
+    L exists, normal_impulse;
   };
 
+  // So many rows of contacts a visit keeps in registers. A GPU waits for memory once for all of them; the CPU
+  // reads ahead by itself.
+#ifdef __CUDA_ARCH__
+  static constexpr std::uint32_t kNormalsAhead = 4, kFrictionsAhead = 2;
+#else
+  static constexpr std::uint32_t kNormalsAhead = 1, kFrictionsAhead = 1;
+#endif
+
   TANDEM_INLINE NormalRow normal_row(std::uint32_t contact) const {
+    return normal_row(contact, normal(contact).followed);
+  }
+  TANDEM_INLINE NormalRow normal_row(std::uint32_t contact, const SoftNumber& followed) const {
     const SoftNormal& row = normal(contact);
-    return {direction(row.direction), take(row.mass), take(row.drive), take(row.followed), take(row.impulse)};
+    return {direction(row.direction), take(row.mass),    take(row.drive),
+            take(followed),           take(row.impulse), bounces_ ? take(gap(contact).strongest) : L{}};
+  }
+  TANDEM_INLINE FrictionRow friction_row(std::uint32_t contact) const {
+    const SoftFriction& row = friction(contact);
+    return {direction(row.first),    direction(row.second),  take(row.mass),
+            take(row.coefficient),   take(row.first_drive),  take(row.second_drive),
+            take(row.sum_of_normal), take(row.sum_of_first), take(row.sum_of_second)};
+  }
+  TANDEM_INLINE Pushed pushed(std::uint32_t contact) const {
+    const SoftFriction& row = friction(contact);
+    return {take(normal(contact).impulse), take(row.first_impulse), take(row.second_impulse)};
+  }
+  TANDEM_INLINE TurningRow turning_row() const {
+    const auto row = [&](const SoftNumber* matrix, int i) {
+      return Vector3Of<L>{take(matrix[3 * i]), take(matrix[3 * i + 1]), take(matrix[3 * i + 2])};
+    };
+    const SoftNumber *const a = turning_.spread_a, *const b = turning_.spread_b;
+    return {{row(a, 0), row(a, 1), row(a, 2)},
+            {row(b, 0), row(b, 1), row(b, 2)},
+            taken<L>(turning_.drive, lane_),
+            take(turning_.mass),
+            take(turning_.lever)};
+  }
+  TANDEM_INLINE UnmadeRow unmade_row(std::uint32_t contact) const {
+    const SoftNormal& normal = this->normal(contact);
+    const SoftFriction& friction = this->friction(contact);
+    return {taken<L>(normal.direction.along, lane_),
+            taken<L>(friction.first.along, lane_),
+            taken<L>(friction.second.along, lane_),
+            taken<L>(normal.direction.turn_a, lane_),
+            taken<L>(normal.direction.turn_b, lane_),
+            taken<L>(friction.first.turn_a, lane_),
+            taken<L>(friction.second.turn_a, lane_),
+            take(normal.mass),
+            take(normal.impulse)};
   }
 
-  // Calls visit(i, row) for each contact. One lane reads the next row before it visits one: a GPU solves
-  // while it waits for memory.
-  template <typename Visit>
-  TANDEM_INLINE void for_normals(const Visit& visit) const {
-    if constexpr (L::kLanes > 1) {
-      for (std::uint32_t i = 0; i < contacts_; ++i) visit(i, normal_row(i));
+  // Calls visit(i, read(i)) for each contact. The first kAhead rows are read before ready() is called, the
+  // others as soon as there is room for them.
+  template <std::uint32_t kAhead, typename Read, typename Ready, typename Visit>
+  TANDEM_INLINE void for_contacts(const Read& read, const Ready& ready, const Visit& visit) const {
+    if constexpr (kAhead == 1) {
+      ready();
+      for (std::uint32_t i = 0; i < contacts_; ++i) visit(i, read(i));
     } else {
-      NormalRow next = normal_row(0);
-      for (std::uint32_t i = 0; i < contacts_; ++i) {
-        const NormalRow row = next;
-        if (i + 1 < contacts_) next = normal_row(i + 1);
-        visit(i, row);
+      // Loops over `rows` are unrolled, so that these are registers. They begin as 0: a compiler keeps a
+      // register for ever that is only set under a condition.
+      decltype(read(0)) rows[kAhead] = {};
+      TANDEM_UNROLL
+      for (std::uint32_t k = 0; k < kAhead; ++k) {
+        if (k < contacts_) rows[k] = read(k);
+      }
+      ready();
+      for (std::uint32_t first = 0; first < contacts_; first += kAhead) {
+        TANDEM_UNROLL
+        for (std::uint32_t k = 0; k < kAhead; ++k) {
+          const std::uint32_t i = first + k;
+          if (i < contacts_) visit(i, rows[k]);
+          if (i + kAhead < contacts_) rows[k] = read(i + kAhead);
+        }
       }
     }
   }
 
   // See SoftNormal. One mass does for both directions of friction, or it would not oppose the slip.
-  TANDEM_INLINE void make_rows(SoftNormal& normal, SoftFriction& friction) const {
-    const Vector3Of<L> arm_a = taken<L>(normal.direction.turn_a, lane_),
-                       arm_b = taken<L>(normal.direction.turn_b, lane_);
-    const Vector3Of<L> velocity = taken<L>(friction.first.turn_a, lane_),
-                       impulse = taken<L>(friction.second.turn_a, lane_);
-    const L exists = take(normal.mass);
-    const L along_normal = make_turns(normal.direction, arm_a, arm_b);
-    const L along_first = make_turns(friction.first, arm_a, arm_b),
-            along_second = make_turns(friction.second, arm_a, arm_b);
+  TANDEM_INLINE void start(std::uint32_t contact, const UnmadeRow& unmade, const TurningRow& turning) {
+    SoftNormal& normal = this->normal(contact);
+    SoftFriction& friction = this->friction(contact);
+    const auto made = [&](const Vector3Of<L>& along) {
+      return Direction{along, across(turning.spread_a, cross(along, unmade.arm_a)),
+                       across(turning.spread_b, cross(unmade.arm_b, along))};
+    };
+    const Direction along_normal = made(unmade.normal), first = made(unmade.first),
+                    second = made(unmade.second);
+    put_turns(along_normal, normal.direction);
+    put_turns(first, friction.first), put_turns(second, friction.second);
     const auto inverse = [&](const L& mobility) {
-      return exists / select(less(L{}, mobility), mobility, all_of<L>(1));
+      return unmade.exists / select(less(L{}, mobility), mobility, all_of<L>(1));
     };
-    put(inverse(along_normal), normal.mass, lane_);
-    put(inverse(larger(along_first, along_second)), friction.mass, lane_);
-    const auto along = [&](const SoftDirection& direction, const Vector3Of<L>& p) {
-      return dot(taken<L>(direction.along, lane_), p);
-    };
-    put(along(normal.direction, velocity), normal.drive, lane_);
-    put(along(friction.first, velocity), friction.first_drive, lane_);
-    put(along(friction.second, velocity), friction.second_drive, lane_);
-    put(along(friction.first, impulse), friction.first_impulse, lane_);
-    put(along(friction.second, impulse), friction.second_impulse, lane_);
+    put(inverse(mobility(along_normal)), normal.mass, lane_);
+    put(inverse(larger(mobility(first), mobility(second))), friction.mass, lane_);
+    put(dot(unmade.normal, unmade.velocity), normal.drive, lane_);
+    put(dot(unmade.first, unmade.velocity), friction.first_drive, lane_);
+    put(dot(unmade.second, unmade.velocity), friction.second_drive, lane_);
+    const L first_impulse = dot(unmade.first, unmade.impulse),
+            second_impulse = dot(unmade.second, unmade.impulse);
+    put(first_impulse, friction.first_impulse, lane_);
+    put(second_impulse, friction.second_impulse, lane_);
+    push(along_normal, unmade.normal_impulse);
+    push(first, first_impulse);
+    push(second, second_impulse);
   }
-
+  TANDEM_INLINE void put_turns(const Direction& from, SoftDirection& to) const {
+    put(from.turn_a, to.turn_a, lane_), put(from.turn_b, to.turn_b, lane_);
+  }
   // Result: by how much an impulse of 1 changes the velocity along the direction.
-  TANDEM_INLINE L make_turns(SoftDirection& direction, const Vector3Of<L>& arm_a,
-                             const Vector3Of<L>& arm_b) const {
-    const Vector3Of<L> along = taken<L>(direction.along, lane_);
-    const Vector3Of<L> turn_a = across(turning_.spread_a, cross(along, arm_a)),
-                       turn_b = across(turning_.spread_b, cross(arm_b, along));
-    put(turn_a, direction.turn_a, lane_), put(turn_b, direction.turn_b, lane_);
-    return inverse_mass_a_ + inverse_mass_b_ + dot(turn_a, turn_a) + dot(turn_b, turn_b);
+  TANDEM_INLINE L mobility(const Direction& d) const {
+    return inverse_mass_a_ + inverse_mass_b_ + dot(d.turn_a, d.turn_a) + dot(d.turn_b, d.turn_b);
   }
 
-  TANDEM_INLINE L take(const SoftNumber& from) const { return taken<L>(from, lane_); }
+  TANDEM_INLINE L take(const SoftNumber& from) const {
+    return taken<L>(from, lane_);
+  }
   TANDEM_INLINE Direction direction(const SoftDirection& from) const {
     return {taken<L>(from.along, lane_), taken<L>(from.turn_a, lane_), taken<L>(from.turn_b, lane_)};
   }
-  TANDEM_INLINE SoftNormal& normal(std::uint32_t contact) const { return rows_.normals[first_ + contact]; }
-  TANDEM_INLINE SoftGap& gap(std::uint32_t contact) const { return rows_.gaps[first_ + contact]; }
+  TANDEM_INLINE SoftNormal& normal(std::uint32_t contact) const {
+    return rows_.normals[first_ + contact];
+  }
+  TANDEM_INLINE SoftGap& gap(std::uint32_t contact) const {
+    return rows_.gaps[first_ + contact];
+  }
   TANDEM_INLINE SoftFriction& friction(std::uint32_t contact) const {
     return rows_.frictions[first_ + contact];
   }
@@ -281,7 +419,9 @@ class PairVisit {
   TANDEM_INLINE static L speed(const Direction& d, const MotionOf<L>& a, const MotionOf<L>& b) {
     return dot(d.along, b.centre - a.centre) + dot(d.turn_a, a.spin) + dot(d.turn_b, b.spin);
   }
-  TANDEM_INLINE L speed(const Direction& d) const { return speed(d, a_, b_); }
+  TANDEM_INLINE L speed(const Direction& d) const {
+    return speed(d, a_, b_);
+  }
   TANDEM_INLINE void push(const Direction& d, const L& impulse) {
     a_.centre = a_.centre - (impulse * inverse_mass_a_) * d.along;
     b_.centre = b_.centre + (impulse * inverse_mass_b_) * d.along;
@@ -300,25 +440,32 @@ class PairVisit {
     const L next = next_impulse(row, bias, mass_scale, impulse_scale);
     push(row.along, next - row.impulse);
     put(next, normal(contact).impulse, lane_);
-    if (bounces_) put(larger(take(gap(contact).strongest), next), gap(contact).strongest, lane_);
+    if (bounces_) put(larger(row.strongest, next), gap(contact).strongest, lane_);
+  }
+  TANDEM_INLINE void relax(std::uint32_t contact, const NormalRow& row) {
+    const L none{};
+    visit(contact, row, larger(none, row.followed * all_of<L>(rows_.inverse_h)), all_of<L>(1), none);
+  }
+  // a, b: how far the bodies have moved.
+  TANDEM_INLINE static L followed(const L& separation, const Direction& along, const L& drive, float time,
+                                  const MotionOf<L>& a, const MotionOf<L>& b) {
+    return separation + speed(along, a, b) + time * drive;
   }
 
-  TANDEM_INLINE void rub(SoftFriction& row, const L& push_of_normal) {
-    const L bound = take(row.coefficient) * push_of_normal, mass = take(row.mass);
-    const Direction first = direction(row.first), second = direction(row.second);
-    const L old1 = take(row.first_impulse), old2 = take(row.second_impulse);
-    L next1 = old1 - mass * (speed(first) + take(row.first_drive));
-    L next2 = old2 - mass * (speed(second) + take(row.second_drive));
+  TANDEM_INLINE void rub(SoftFriction& to, const Pushed& old, const FrictionRow& row) {
+    const L bound = row.coefficient * old.normal;
+    L next1 = old.first - row.mass * (speed(row.first) + row.first_drive);
+    L next2 = old.second - row.mass * (speed(row.second) + row.second_drive);
     const L size = square_root(next1 * next1 + next2 * next2);
     const L part = shortening(size, bound);
     next1 = part * next1, next2 = part * next2;
-    push(first, next1 - old1);
-    push(second, next2 - old2);
-    put(next1, row.first_impulse, lane_);
-    put(next2, row.second_impulse, lane_);
-    put(take(row.sum_of_normal) + push_of_normal, row.sum_of_normal, lane_);
-    put(take(row.sum_of_first) + next1, row.sum_of_first, lane_);
-    put(take(row.sum_of_second) + next2, row.sum_of_second, lane_);
+    push(row.first, next1 - old.first);
+    push(row.second, next2 - old.second);
+    put(next1, to.first_impulse, lane_);
+    put(next2, to.second_impulse, lane_);
+    put(row.sum_of_normal + old.normal, to.sum_of_normal, lane_);
+    put(row.sum_of_first + next1, to.sum_of_first, lane_);
+    put(row.sum_of_second + next2, to.sum_of_second, lane_);
   }
 
   // Makes what is longer than the bound as long as it.
@@ -331,30 +478,28 @@ class PairVisit {
   TANDEM_INLINE static L rest_of(const L& bound, const L& other) {
     return square_root(larger(L{}, bound * bound - other * other));
   }
-  TANDEM_INLINE static L within(const L& x, const L& bound) { return larger(-bound, smaller(x, bound)); }
-
-  TANDEM_INLINE void turn(const Vector3Of<L>& impulse) {
-    a_.spin = a_.spin - across(turning_.spread_a, impulse);
-    b_.spin = b_.spin + across(turning_.spread_b, impulse);
-  }
-  TANDEM_INLINE Vector3Of<L> row(const SoftNumber* matrix, int i) const {
-    return {take(matrix[3 * i]), take(matrix[3 * i + 1]), take(matrix[3 * i + 2])};
-  }
-  TANDEM_INLINE Vector3Of<L> across(const SoftNumber* matrix, const Vector3Of<L>& p) const {
-    return p.x * row(matrix, 0) + p.y * row(matrix, 1) + p.z * row(matrix, 2);
-  }
-  TANDEM_INLINE Vector3Of<L> applied(const SoftNumber* matrix, const Vector3Of<L>& p) const {
-    return {dot(row(matrix, 0), p), dot(row(matrix, 1), p), dot(row(matrix, 2), p)};
+  TANDEM_INLINE static L within(const L& x, const L& bound) {
+    return larger(-bound, smaller(x, bound));
   }
 
-  TANDEM_INLINE void resist_turning(const L& push_of_normals) {
-    const L bound = take(turning_.lever) * push_of_normals, mass = take(turning_.mass);
-    const Vector3Of<L> turning = applied(turning_.spread_b, b_.spin) - applied(turning_.spread_a, a_.spin) +
-                                 taken<L>(turning_.drive, lane_);
-    const Vector3Of<L> old = taken<L>(turning_.impulse, lane_);
-    Vector3Of<L> next = old - mass * turning;
+  TANDEM_INLINE void turn(const TurningRow& row, const Vector3Of<L>& impulse) {
+    a_.spin = a_.spin - across(row.spread_a, impulse);
+    b_.spin = b_.spin + across(row.spread_b, impulse);
+  }
+  TANDEM_INLINE static Vector3Of<L> across(const Vector3Of<L> (&matrix)[3], const Vector3Of<L>& p) {
+    return p.x * matrix[0] + p.y * matrix[1] + p.z * matrix[2];
+  }
+  TANDEM_INLINE static Vector3Of<L> applied(const Vector3Of<L> (&matrix)[3], const Vector3Of<L>& p) {
+    return {dot(matrix[0], p), dot(matrix[1], p), dot(matrix[2], p)};
+  }
+
+  TANDEM_INLINE void resist_turning(const L& push_of_normals, const Vector3Of<L>& old,
+                                    const TurningRow& row) {
+    const L bound = row.lever * push_of_normals;
+    const Vector3Of<L> turning = applied(row.spread_b, b_.spin) - applied(row.spread_a, a_.spin) + row.drive;
+    Vector3Of<L> next = old - row.mass * turning;
     next = shortening(square_root(dot(next, next)), bound) * next;
-    turn(next - old);
+    turn(row, next - old);
     put(next.x, turning_.impulse[0], lane_);
     put(next.y, turning_.impulse[1], lane_);
     put(next.z, turning_.impulse[2], lane_);

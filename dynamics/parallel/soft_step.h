@@ -70,7 +70,7 @@ struct SoftStepView {
 namespace soft_step_detail {
 
 TANDEM_HD inline void fill_body(const SoftStepView& view, std::uint32_t i) {
-  if (i == 0) *view.bounces = 0;
+  if (i == 0) *view.bounces = 0, *view.sweeps.arrived = 0;
   view.sweeps.velocities[i] = {}, view.sweeps.moved[i] = {};
   if (!view.is_held(i)) return;
   view.bodies[i] = soft_body(view.numbers, view.unit_root(), i);
@@ -166,7 +166,7 @@ class ParallelSoftStep {
     take(grouping_.reserve(room_.pairs, room_.groups, room_.rows));
     take(bodies_.reserve(room_.bodies)), take(gains_.reserve(room_.bodies));
     take(starts_.reserve(room_.bodies)), take(velocities_.reserve(room_.bodies));
-    take(moved_.reserve(room_.bodies)), take(bounces_.reserve(1));
+    take(moved_.reserve(room_.bodies)), take(bounces_.reserve(1)), take(arrived_.reserve(1));
     take(groups_.reserve(room_.groups)), take(turnings_.reserve(room_.groups));
     take(turns_.reserve(room_.groups)), take(normals_.reserve(room_.rows));
     take(gaps_.reserve(room_.rows)), take(frictions_.reserve(room_.rows));
@@ -232,15 +232,16 @@ class ParallelSoftStep {
         nullptr,         nullptr,      groups_.data(),    turnings_.data(),
         normals_.data(), gaps_.data(), frictions_.data(), static_cast<float>(1 / numbers.h)};
     const GroupsView& groups = grouping_.view();
-    return {numbers,
-            {rows, turns_.data(), velocities_.data(), moved_.data(), gains_.data(), starts_.data(),
-             groups.groups, bounces_.data(), numbers.h, options.substeps},
-            groups,
-            input,
-            output,
-            bodies_.data(),
-            turns_.data(),
-            bounces_.data()};
+    return {
+        numbers,
+        {rows, turns_.data(), velocities_.data(), moved_.data(), gains_.data(), starts_.data(), groups.groups,
+         groups.colours, groups.shared, arrived_.data(), bounces_.data(), numbers.h, options.substeps},
+        groups,
+        input,
+        output,
+        bodies_.data(),
+        turns_.data(),
+        bounces_.data()};
   }
 
   template <typename T>
@@ -253,7 +254,7 @@ class ParallelSoftStep {
   Array<SteppedBody> bodies_;
   Array<SoftMotion> gains_, starts_;
   Array<SharedMotion> velocities_, moved_;
-  Array<std::uint32_t> bounces_;
+  Array<std::uint32_t> bounces_, arrived_;
   Array<SoftPairs> groups_;
   Array<SoftTurning> turnings_;
   Array<SoftTurns> turns_;

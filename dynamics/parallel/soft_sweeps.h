@@ -3,6 +3,7 @@
 #include <cstdint>
 
 #include "dynamics/one_lane.h"
+#include "dynamics/parallel/meeting.h"
 #include "dynamics/parallel/pair_groups.h"
 #include "dynamics/parallel/turns.h"
 #include "dynamics/parallel/worker.h"
@@ -57,6 +58,9 @@ struct SoftSweeps {
   SharedMotion *velocities, *moved;  // of each body: what the step adds; turn k of `moved` is substep k
   SoftMotion *gains, *starts;        // of each body: see work_on()
   const std::uint32_t* groups;
+  const ColourPlaces* colours;  // see GroupsView
+  const std::uint32_t* shared;
+  std::uint32_t* arrived;        // see meet()
   const std::uint32_t* bounces;  // 1 where any pair does
   double h;
   std::uint32_t substeps;
@@ -155,24 +159,28 @@ TANDEM_HD inline void hand_on(const SoftSweeps& all, const Sweep& sweep, const S
   give_turn(all.velocities[side.body], side.turn + 1, velocity);
 }
 
-TANDEM_HD inline void visit(const SoftSweeps& all, const Sweep& sweep, PairVisit<OneLane>& pair,
-                            const PairMotions& motions) {
+// PairVisit has internal linkage, and so has what is made with it.
+namespace {
+
+/// ready() fills the motions and begins the pair's visit.
+template <typename Ready>
+TANDEM_HD void visit(const SoftSweeps& all, const Sweep& sweep, PairVisit<OneLane>& pair,
+                     const MotionOf<OneLane> (&moved)[2], const Ready& ready) {
   using enum Sweep::Kind;
   switch (sweep.kind) {
     case start:
-      return pair.start();
+      return pair.start(ready);
     case push:
-      return pair.push_apart();
+      return pair.push_apart(ready);
     case follow:
-      pair.follow(static_cast<float>((sweep.substep + 1) * all.h), lanes_of(motions.moved[0]),
-                  lanes_of(motions.moved[1]));
-      return pair.relax();
+      return pair.follow_and_relax(static_cast<float>((sweep.substep + 1) * all.h), moved[0], moved[1],
+                                   ready);
     case relax:
-      return pair.relax();
+      return pair.relax(ready);
     case rub:
-      return pair.rub();
+      return pair.rub(ready);
     case rebound:
-      return pair.rebound();
+      return pair.rebound(ready);
   }
 }
 
@@ -182,11 +190,26 @@ TANDEM_HD inline void visit_lane(const SoftSweeps& all, std::uint32_t number, co
   const SoftTurns& turns = all.turns[group];
   const Side sides[2] = {side_of(turns, 0, lane, number), side_of(turns, 1, lane, number)};
   PairVisit<OneLane> pair(all.rows, group, lane);
-  const PairMotions motions = wait_for(all, sweep, sides);
-  pair.begin(lanes_of(motions.velocities[0]), lanes_of(motions.velocities[1]));
-  visit(all, sweep, pair, motions);
+  MotionOf<OneLane> moved[2] = {};
+  visit(all, sweep, pair, moved, [&] {
+    const PairMotions motions = wait_for(all, sweep, sides);
+    pair.begin(lanes_of(motions.velocities[0]), lanes_of(motions.velocities[1]));
+    moved[0] = lanes_of(motions.moved[0]), moved[1] = lanes_of(motions.moved[1]);
+  });
   if (sides[0].moves) hand_on(all, sweep, sides[0], motion_of(pair.a()));
   if (sides[1].moves) hand_on(all, sweep, sides[1], motion_of(pair.b()));
+}
+
+}  // namespace
+
+/// Returns the task with which the tasks of a colour end. All pairs with a colour of their own count as one
+/// colour, the one after the last that pairs may share.
+TANDEM_HD inline std::uint32_t end_of_colour(const SoftSweeps& all, std::uint32_t colour) {
+  const std::uint32_t next = colour + 1;
+  return (next < kSharedColours    ? all.colours[next].first_group
+          : next == kSharedColours ? *all.shared
+                                   : *all.groups) /
+         kGroupsOfTeam;
 }
 
 }  // namespace soft_sweeps_detail
@@ -194,17 +217,30 @@ TANDEM_HD inline void visit_lane(const SoftSweeps& all, std::uint32_t number, co
 /// Does a worker's part of all sweeps. Workers need not wait for the end of a colour or of a sweep: a pair
 /// waits for those that come before it at its bodies, which are of earlier sweeps or of colours before its
 /// own. Teams take groups in the order of colours, so that there always is a pair whose turn it is.
+///
+/// Where there are many tasks, many pairs would look for their turns all the time and keep the memory from
+/// those that have theirs. So workers meet after each colour there: then no pair looks in vain, but for those
+/// with a colour of their own.
 TANDEM_HD inline void sweep_all(const SoftSweeps& all, const Worker& worker) {
-  constexpr std::uint32_t kLanes = kGroupsOfTeam * kSoftWidth;
+  constexpr std::uint32_t kLanes = kGroupsOfTeam * kSoftWidth, kMostTasksWithoutMeeting = 600;
   const std::uint32_t tasks = *all.groups / kGroupsOfTeam;
-  if (worker.team >= tasks) return;
+  const bool meets = kCanMeet && tasks > kMostTasksWithoutMeeting;
+  if (worker.team >= tasks && !meets) return;
   const std::uint32_t sweeps = all.sweeps();
+  std::uint32_t meetings = 0;
   for (std::uint32_t number = 0; number < sweeps; ++number) {
     const Sweep sweep = sweep_of(number, all.substeps);
-    for (std::uint32_t task = worker.team; task < tasks; task += worker.teams) {
-      for (std::uint32_t lane = worker.lane; lane < kLanes; lane += worker.lanes)
-        soft_sweeps_detail::visit_lane(all, number, sweep, kGroupsOfTeam * task + lane / kSoftWidth,
-                                       static_cast<int>(lane % kSoftWidth));
+    std::uint32_t begin = 0;
+    for (std::uint32_t colour = 0; begin < tasks; ++colour) {
+      const std::uint32_t end = meets ? soft_sweeps_detail::end_of_colour(all, colour) : tasks;
+      if (begin == end) continue;
+      for (std::uint32_t task = begin + worker.team; task < end; task += worker.teams) {
+        for (std::uint32_t lane = worker.lane; lane < kLanes; lane += worker.lanes)
+          soft_sweeps_detail::visit_lane(all, number, sweep, kGroupsOfTeam * task + lane / kSoftWidth,
+                                         static_cast<int>(lane % kSoftWidth));
+      }
+      if (meets) meet(*all.arrived, ++meetings);
+      begin = end;
     }
   }
 }

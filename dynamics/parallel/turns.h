@@ -48,9 +48,12 @@ TANDEM_HD inline void give_turn(TurnWord& to, std::uint32_t turn, const std::uin
 #endif
 }
 
-/// Lets others run, where whoever has the turn may be waiting for a processor.
+/// Lets others run: whoever has the turn may be waiting for a processor.
 TANDEM_HD inline void wait_for_turn() {
-#ifndef __CUDA_ARCH__
+#ifdef __CUDA_ARCH__
+  // Others have more of the memory's time while those who wait look less often.
+  __nanosleep(100);
+#else
   std::this_thread::yield();
 #endif
 }

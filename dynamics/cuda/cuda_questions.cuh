@@ -125,15 +125,17 @@ class CudaQuestions {
 
   Status reserve(std::uint32_t bodies, std::uint32_t pairs) {
     bodies_ = bodies;
+    // Of most pairs that are near nothing is asked.
     QuestionNeeds needs = {};
     needs.near.pairs = needs.contacts.pairs = needs.manifolds.pairs = needs.distances.pairs = pairs;
-    needs.contacts.contacts = std::max(std::uint64_t{1} << 18, 32 * std::uint64_t{pairs});
+    needs.contacts.contacts = std::max(std::uint64_t{1} << 18, 4 * std::uint64_t{pairs});
     needs.contacts.undecided = std::uint64_t{1} << 16;
     needs.manifolds.contacts = needs.contacts.contacts;
-    needs.manifolds.manifolds = 2 * pairs, needs.manifolds.points = 8 * pairs;
-    needs.distances.block_pairs = std::max(1u << 18, 64 * pairs);
-    needs.distances.triangle_pairs = std::max(1u << 16, 8 * pairs);
-    needs.distances.settled = std::max(1u << 14, 2 * pairs);
+    needs.manifolds.manifolds = std::max(1u << 12, pairs / 2);
+    needs.manifolds.points = std::max(1u << 14, 2 * pairs);
+    needs.distances.block_pairs = std::max(1u << 18, 8 * pairs);
+    needs.distances.triangle_pairs = std::max(1u << 16, 2 * pairs);
+    needs.distances.settled = std::max(1u << 14, pairs / 2);
     needs.distances.words = kFewWords;
     return provide(needs);
   }

@@ -60,7 +60,7 @@ struct SoftSweeps {
   const std::uint32_t* groups;
   const ColourPlaces* colours;  // see GroupsView
   const std::uint32_t* shared;
-  std::uint32_t* arrived;        // see meet()
+  std::uint32_t* arrived;        // see Meetings
   const std::uint32_t* bounces;  // 1 where any pair does
   double h;
   std::uint32_t substeps;
@@ -185,13 +185,14 @@ TANDEM_HD void visit(const SoftSweeps& all, const Sweep& sweep, PairVisit<OneLan
 }
 
 TANDEM_HD inline void visit_lane(const SoftSweeps& all, std::uint32_t number, const Sweep& sweep,
-                                 std::uint32_t group, int lane) {
+                                 const Meetings& meetings, std::uint32_t group, int lane) {
   if (static_cast<std::uint32_t>(lane) >= all.rows.pairs[group].pairs) return;
   const SoftTurns& turns = all.turns[group];
   const Side sides[2] = {side_of(turns, 0, lane, number), side_of(turns, 1, lane, number)};
   PairVisit<OneLane> pair(all.rows, group, lane);
   MotionOf<OneLane> moved[2] = {};
   visit(all, sweep, pair, moved, [&] {
+    meetings.wait();
     const PairMotions motions = wait_for(all, sweep, sides);
     pair.begin(lanes_of(motions.velocities[0]), lanes_of(motions.velocities[1]));
     moved[0] = lanes_of(motions.moved[0]), moved[1] = lanes_of(motions.moved[1]);
@@ -219,15 +220,15 @@ TANDEM_HD inline std::uint32_t end_of_colour(const SoftSweeps& all, std::uint32_
 /// own. Teams take groups in the order of colours, so that there always is a pair whose turn it is.
 ///
 /// Where there are many tasks, many pairs would look for their turns all the time and keep the memory from
-/// those that have theirs. So workers meet after each colour there: then no pair looks in vain, but for those
-/// with a colour of their own.
+/// those that have theirs. So workers meet after each colour there: then hardly a pair looks in vain, but for
+/// those with a colour of their own. On its way to a meeting a worker reads rows of the next colour.
 TANDEM_HD inline void sweep_all(const SoftSweeps& all, const Worker& worker) {
   constexpr std::uint32_t kLanes = kGroupsOfTeam * kSoftWidth, kMostTasksWithoutMeeting = 600;
   const std::uint32_t tasks = *all.groups / kGroupsOfTeam;
   const bool meets = kCanMeet && tasks > kMostTasksWithoutMeeting;
+  Meetings meetings(all.arrived);
   if (worker.team >= tasks && !meets) return;
   const std::uint32_t sweeps = all.sweeps();
-  std::uint32_t meetings = 0;
   for (std::uint32_t number = 0; number < sweeps; ++number) {
     const Sweep sweep = sweep_of(number, all.substeps);
     std::uint32_t begin = 0;
@@ -236,10 +237,12 @@ TANDEM_HD inline void sweep_all(const SoftSweeps& all, const Worker& worker) {
       if (begin == end) continue;
       for (std::uint32_t task = begin + worker.team; task < end; task += worker.teams) {
         for (std::uint32_t lane = worker.lane; lane < kLanes; lane += worker.lanes)
-          soft_sweeps_detail::visit_lane(all, number, sweep, kGroupsOfTeam * task + lane / kSoftWidth,
+          soft_sweeps_detail::visit_lane(all, number, sweep, meetings,
+                                         kGroupsOfTeam * task + lane / kSoftWidth,
                                          static_cast<int>(lane % kSoftWidth));
       }
-      if (meets) meet(*all.arrived, ++meetings);
+      meetings.wait();
+      if (meets) meetings.come();
       begin = end;
     }
   }

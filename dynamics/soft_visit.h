@@ -95,7 +95,7 @@ struct Nothing {
 
 /// The bodies of as many pairs as there are lanes, from `lane` on. A visit calls ready() when it has read all
 /// that it can before it knows how the bodies move; it has begun after that.
-template <typename L>
+template <typename L, bool kReadsAhead = false>
 class PairVisit {
  public:
   TANDEM_INLINE PairVisit(const SoftRows& rows, std::uint32_t group, int lane)
@@ -286,13 +286,9 @@ class PairVisit {
     L exists, normal_impulse;
   };
 
-  // So many rows of contacts a visit keeps in registers. A GPU waits for memory once for all of them; the CPU
-  // reads ahead by itself.
-#ifdef __CUDA_ARCH__
-  static constexpr std::uint32_t kNormalsAhead = 4, kFrictionsAhead = 2;
-#else
-  static constexpr std::uint32_t kNormalsAhead = 1, kFrictionsAhead = 1;
-#endif
+  // So many rows of contacts a visit keeps in registers. Where many pairs are visited on a GPU, it waits for
+  // memory once for all of them; few pairs have their rows at hand, and the CPU reads ahead by itself.
+  static constexpr std::uint32_t kNormalsAhead = kReadsAhead ? 4 : 1, kFrictionsAhead = kReadsAhead ? 2 : 1;
 
   TANDEM_INLINE NormalRow normal_row(std::uint32_t contact) const {
     return normal_row(contact, normal(contact).followed);
@@ -400,18 +396,12 @@ class PairVisit {
     return inverse_mass_a_ + inverse_mass_b_ + dot(d.turn_a, d.turn_a) + dot(d.turn_b, d.turn_b);
   }
 
-  TANDEM_INLINE L take(const SoftNumber& from) const {
-    return taken<L>(from, lane_);
-  }
+  TANDEM_INLINE L take(const SoftNumber& from) const { return taken<L>(from, lane_); }
   TANDEM_INLINE Direction direction(const SoftDirection& from) const {
     return {taken<L>(from.along, lane_), taken<L>(from.turn_a, lane_), taken<L>(from.turn_b, lane_)};
   }
-  TANDEM_INLINE SoftNormal& normal(std::uint32_t contact) const {
-    return rows_.normals[first_ + contact];
-  }
-  TANDEM_INLINE SoftGap& gap(std::uint32_t contact) const {
-    return rows_.gaps[first_ + contact];
-  }
+  TANDEM_INLINE SoftNormal& normal(std::uint32_t contact) const { return rows_.normals[first_ + contact]; }
+  TANDEM_INLINE SoftGap& gap(std::uint32_t contact) const { return rows_.gaps[first_ + contact]; }
   TANDEM_INLINE SoftFriction& friction(std::uint32_t contact) const {
     return rows_.frictions[first_ + contact];
   }
@@ -419,9 +409,7 @@ class PairVisit {
   TANDEM_INLINE static L speed(const Direction& d, const MotionOf<L>& a, const MotionOf<L>& b) {
     return dot(d.along, b.centre - a.centre) + dot(d.turn_a, a.spin) + dot(d.turn_b, b.spin);
   }
-  TANDEM_INLINE L speed(const Direction& d) const {
-    return speed(d, a_, b_);
-  }
+  TANDEM_INLINE L speed(const Direction& d) const { return speed(d, a_, b_); }
   TANDEM_INLINE void push(const Direction& d, const L& impulse) {
     a_.centre = a_.centre - (impulse * inverse_mass_a_) * d.along;
     b_.centre = b_.centre + (impulse * inverse_mass_b_) * d.along;
@@ -478,9 +466,7 @@ class PairVisit {
   TANDEM_INLINE static L rest_of(const L& bound, const L& other) {
     return square_root(larger(L{}, bound * bound - other * other));
   }
-  TANDEM_INLINE static L within(const L& x, const L& bound) {
-    return larger(-bound, smaller(x, bound));
-  }
+  TANDEM_INLINE static L within(const L& x, const L& bound) { return larger(-bound, smaller(x, bound)); }
 
   TANDEM_INLINE void turn(const TurningRow& row, const Vector3Of<L>& impulse) {
     a_.spin = a_.spin - across(row.spread_a, impulse);

@@ -86,6 +86,8 @@ class CudaExecutor {
     GpuArray<T> array_;
   };
 
+  static constexpr bool kHasManyWorkers = true;
+
   /// Calls that are queued as one graph when they come for the third time.
   class Sequence {
    public:

@@ -38,6 +38,8 @@ class HostExecutor {
     std::vector<T> elements_;
   };
 
+  static constexpr bool kHasManyWorkers = false;  ///< thousands, in together()
+
   /// Calls that are queued together, again and again.
   struct Sequence {};
 

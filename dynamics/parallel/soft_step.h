@@ -208,7 +208,10 @@ class ParallelSoftStep {
   void sweep(Executor& executor) {
     const SoftSweeps sweeps = view_->sweeps;
     executor.together(room_.groups / kGroupsOfTeam,
-                      [=] TANDEM_HD(const Worker& worker) { sweep_all(sweeps, worker); });
+                      [=] TANDEM_HD(const Worker& worker) { sweep_all<false>(sweeps, worker); });
+    if constexpr (Executor::kHasManyWorkers)
+      executor.together(room_.groups / kGroupsOfTeam,
+                        [=] TANDEM_HD(const Worker& worker) { sweep_all<true>(sweeps, worker); });
   }
   void write(Executor& executor) {
     using namespace soft_step_detail;

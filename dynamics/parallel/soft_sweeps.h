@@ -163,8 +163,8 @@ TANDEM_HD inline void hand_on(const SoftSweeps& all, const Sweep& sweep, const S
 namespace {
 
 /// ready() fills the motions and begins the pair's visit.
-template <typename Ready>
-TANDEM_HD void visit(const SoftSweeps& all, const Sweep& sweep, PairVisit<OneLane>& pair,
+template <bool kMany, typename Ready>
+TANDEM_HD void visit(const SoftSweeps& all, const Sweep& sweep, PairVisit<OneLane, kMany>& pair,
                      const MotionOf<OneLane> (&moved)[2], const Ready& ready) {
   using enum Sweep::Kind;
   switch (sweep.kind) {
@@ -184,15 +184,16 @@ TANDEM_HD void visit(const SoftSweeps& all, const Sweep& sweep, PairVisit<OneLan
   }
 }
 
-TANDEM_HD inline void visit_lane(const SoftSweeps& all, std::uint32_t number, const Sweep& sweep,
-                                 const Meetings& meetings, std::uint32_t group, int lane) {
+template <bool kMany>
+TANDEM_HD void visit_lane(const SoftSweeps& all, std::uint32_t number, const Sweep& sweep,
+                          const Meetings& meetings, std::uint32_t group, int lane) {
   if (static_cast<std::uint32_t>(lane) >= all.rows.pairs[group].pairs) return;
   const SoftTurns& turns = all.turns[group];
   const Side sides[2] = {side_of(turns, 0, lane, number), side_of(turns, 1, lane, number)};
-  PairVisit<OneLane> pair(all.rows, group, lane);
+  PairVisit<OneLane, kMany> pair(all.rows, group, lane);
   MotionOf<OneLane> moved[2] = {};
   visit(all, sweep, pair, moved, [&] {
-    meetings.wait();
+    if constexpr (kMany) meetings.wait();
     const PairMotions motions = wait_for(all, sweep, sides);
     pair.begin(lanes_of(motions.velocities[0]), lanes_of(motions.velocities[1]));
     moved[0] = lanes_of(motions.moved[0]), moved[1] = lanes_of(motions.moved[1]);
@@ -222,27 +223,30 @@ TANDEM_HD inline std::uint32_t end_of_colour(const SoftSweeps& all, std::uint32_
 /// Where there are many tasks, many pairs would look for their turns all the time and keep the memory from
 /// those that have theirs. So workers meet after each colour there: then hardly a pair looks in vain, but for
 /// those with a colour of their own. On its way to a meeting a worker reads rows of the next colour.
-TANDEM_HD inline void sweep_all(const SoftSweeps& all, const Worker& worker) {
+///
+/// kMany: on a GPU, what is for few tasks leaves many alone, and the other way round. Workers of the CPU
+/// never meet.
+template <bool kMany>
+TANDEM_HD void sweep_all(const SoftSweeps& all, const Worker& worker) {
   constexpr std::uint32_t kLanes = kGroupsOfTeam * kSoftWidth, kMostTasksWithoutMeeting = 600;
   const std::uint32_t tasks = *all.groups / kGroupsOfTeam;
-  const bool meets = kCanMeet && tasks > kMostTasksWithoutMeeting;
+  if (kCanMeet && (tasks > kMostTasksWithoutMeeting) != kMany) return;
+  if (worker.team >= tasks && !kMany) return;
   Meetings meetings(all.arrived);
-  if (worker.team >= tasks && !meets) return;
   const std::uint32_t sweeps = all.sweeps();
   for (std::uint32_t number = 0; number < sweeps; ++number) {
     const Sweep sweep = sweep_of(number, all.substeps);
     std::uint32_t begin = 0;
     for (std::uint32_t colour = 0; begin < tasks; ++colour) {
-      const std::uint32_t end = meets ? soft_sweeps_detail::end_of_colour(all, colour) : tasks;
+      const std::uint32_t end = kMany ? soft_sweeps_detail::end_of_colour(all, colour) : tasks;
       if (begin == end) continue;
       for (std::uint32_t task = begin + worker.team; task < end; task += worker.teams) {
         for (std::uint32_t lane = worker.lane; lane < kLanes; lane += worker.lanes)
-          soft_sweeps_detail::visit_lane(all, number, sweep, meetings,
-                                         kGroupsOfTeam * task + lane / kSoftWidth,
-                                         static_cast<int>(lane % kSoftWidth));
+          soft_sweeps_detail::visit_lane<kMany>(all, number, sweep, meetings,
+                                                kGroupsOfTeam * task + lane / kSoftWidth,
+                                                static_cast<int>(lane % kSoftWidth));
       }
-      meetings.wait();
-      if (meets) meetings.come();
+      if constexpr (kMany) meetings.wait(), meetings.come();
       begin = end;
     }
   }

@@ -52,14 +52,14 @@ double difference(const BodyState& p, const BodyState& q) {
          norm(p.angular_velocity - q.angular_velocity);
 }
 
-// Sines are rounded otherwise, and nearest points are others within the tolerance of distances, a twentieth of
-// the slop; what bodies do multiplies that.
+// Sines are rounded otherwise, and nearest points are others within the tolerance of distances, a twentieth
+// of the slop; what bodies do multiplies that.
 TEST(GpuWorlds, MoveBodiesAsASimulationDoes) {
   NEEDS_GPU();
   const FallingBodies bodies(24);
   BothWorlds both(bodies);
   double most = 0;
-  for (int step = 0; step < 60; ++step) {
+  for (int step = 0; step < 40; ++step) {
     both.simulation->step();
     ASSERT_EQ(both.world.step(1.0 / 60), Status::kOk) << step << " " << both.world.where();
     const std::vector<BodyState> states = both.on_gpu();

@@ -33,7 +33,7 @@ class GpuScriptTest(unittest.TestCase):
         self.bin.mkdir()
         self.write(self.bin / "nvidia-smi", "#!/bin/sh\necho 'NVIDIA Example, 80GB'\n")
         self.write(self.bin / "compute-sanitizer", "#!/bin/sh\necho '========= ERROR SUMMARY: 0 errors'\n")
-        for name in ("gpu_test", "first_sort_test", "contract_gpu_test", "paper_engine_test", "engine_gpu_test", "gpu_absent_test", "gpu_use_test", "gpu_deform_test", "libtandem.so.0", "libtandem_cuda.so.0"):
+        for name in ("gpu_test", "first_sort_test", "contract_gpu_test", "paper_engine_test", "engine_gpu_test", "parallel_soft_step_gpu_test", "gpu_world_test", "gpu_absent_test", "gpu_use_test", "gpu_deform_test", "gpu_world_use_test", "libtandem.so.0", "libtandem_cuda.so.0"):
             self.program(name, PASSED)
 
     def write(self, path, text):
@@ -60,7 +60,7 @@ class GpuScriptTest(unittest.TestCase):
         self.assertEqual(self.results()["no_gpu.Suite.Passes"],
                          {"machine": "NVIDIA Example, 80GB", "commit": "abc1234", "test": "no_gpu.Suite.Passes", "result": "passed", "milliseconds": "12"})
         self.assertEqual(set(self.results()), {"Suite.Passes", "no_gpu.Suite.Passes", "old_driver.Suite.Passes"})
-        self.assertEqual(done.stdout.count("ERROR SUMMARY: 0 errors"), 8)  # and two of the C interface
+        self.assertEqual(done.stdout.count("ERROR SUMMARY: 0 errors"), 9)  # and three of the C interface
 
     def test_a_test_that_wants_a_mesh_is_named_and_the_sanitizers_run(self):
         self.program("gpu_test", PASSED, SKIPPED % "cow.obj is not here (set TANDEM_MESHES)")

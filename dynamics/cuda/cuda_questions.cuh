@@ -125,7 +125,7 @@ class CudaQuestions {
 
   Status reserve(std::uint32_t bodies, std::uint32_t pairs) {
     bodies_ = bodies;
-    // Of most pairs that are near nothing is asked.
+    // Nothing is asked about most pairs that are near.
     QuestionNeeds needs = {};
     needs.near.pairs = needs.contacts.pairs = needs.manifolds.pairs = needs.distances.pairs = pairs;
     needs.contacts.contacts = std::max(std::uint64_t{1} << 18, 4 * std::uint64_t{pairs});

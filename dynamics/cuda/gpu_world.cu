@@ -211,7 +211,7 @@ Status GpuWorld::bodies(std::span<const BodyMotion>& bodies) {
   return Status::kOk;
 }
 
-// Those of the last step.
+// The records of the last step are those before the next one.
 Status GpuWorld::Parts::read_records() {
   return read(executor, simulation->arrays().records_before, simulation->counts().pairs, records);
 }

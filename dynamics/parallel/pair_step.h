@@ -120,7 +120,7 @@ TANDEM_HD inline void decide_pair(const StepArrays& a, std::uint32_t at) {
     record.posed[0] = plan.keeps ? old->posed[0] : now[0];
     record.posed[1] = plan.keeps ? old->posed[1] : now[1];
   }
-  // Of a fixed body that was placed and another that does not move, nobody wants to know.
+  // Nobody wants to know of a fixed body that was placed and another that does not move.
   const bool counts = !plan.is_idle && (a.properties[pair.a].motion == Motion::moving ||
                                         a.properties[pair.b].motion == Motion::moving);
   plan.is_asked = counts && !plan.keeps && (is_remembered || (plan.is_fast && !plan.is_of_middle));

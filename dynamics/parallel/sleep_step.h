@@ -41,7 +41,7 @@ TANDEM_HD inline void wake_touched(const StepArrays& a, const ObjectPair& pair) 
     const bool sleeps = a.group[other] != Sleep::kAwake;
     if (sleeps && (a.acting[body].motion != Motion::fixed || a.placed[body] != 0))
       mark(a, a.group[other], kWoken);
-    // Without a group it counts anew how long it is quiet.
+    // A body without a group counts anew how long it is quiet.
     if (!sleeps && a.placed[body] != 0) mark(a, other, kWoken);
   };
   wakes(pair.a, pair.b), wakes(pair.b, pair.a);

@@ -49,7 +49,7 @@ struct StepCounts {
 
 /// All arrays of a step.
 struct StepArrays {
-  // Of each body.
+  // These have an element for each body.
   std::uint32_t bodies;
   const BodyProperties* properties;  ///< as they were given
   BodyProperties* acting;            ///< what sleeps is fixed
@@ -66,11 +66,11 @@ struct StepArrays {
   std::uint32_t *group, *label;
   std::uint32_t* marks;
 
-  // Of each shape.
+  // These have one for each shape.
   const double* inner_radius;
   const AssetBox* boxes;
 
-  // Of each pair, of which there is room for most_pairs.
+  // These have one for each pair, of which there is room for most_pairs.
   std::uint32_t most_pairs;
   const ObjectPair* near;
   const std::uint32_t* near_count;
@@ -89,7 +89,7 @@ struct StepArrays {
   Approach* approaches;
   ContactPair* touching;
 
-  // Of each contact: most_found of those found, most_remembered of the others.
+  // These have one for each contact: most_found of those found, most_remembered of the others.
   std::uint32_t most_found, most_remembered;
   ContactPoint* found;
   CachedContact *remembered_before, *remembered;

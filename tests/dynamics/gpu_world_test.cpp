@@ -21,7 +21,7 @@ bool has_gpu() {
 #define NEEDS_GPU() \
   if (!has_gpu()) GTEST_SKIP() << "no GPU"
 
-// The same bodies by a GpuWorld and by a Simulation with soft contacts.
+// Moves the same bodies by a GpuWorld and by a Simulation with soft contacts.
 struct BothWorlds {
   explicit BothWorlds(const FallingBodies& of, const WorldOptions& options = {}) {
     WorldSetup setup;

@@ -17,7 +17,7 @@ bool same_bytes(const BodyState& p, const BodyState& q) {
   return std::memcmp(&p, &q, sizeof p) == 0;
 }
 
-// The same bodies by Simulation and by a parallel simulation on threads of the CPU.
+// Moves the same bodies by a Simulation and by a parallel simulation on threads of the CPU.
 class BothWays {
  public:
   explicit BothWays(const FallingBodies& of, const WorldOptions& options = {}, std::uint32_t threads = 1)

@@ -10,6 +10,7 @@
 #include "dynamics/lists_of_steps.h"
 #include "dynamics/scene_contacts.h"
 #include "dynamics/simulation.h"
+#include "dynamics/world_rows.h"
 #include "dynamics/world_setup.h"
 #include "tandem/kernels/excluded_pairs.h"
 
@@ -55,13 +56,7 @@ struct World::Parts {
   void read_joints();
 };
 
-namespace {
-
-void write(const Vector3& x, double (&out)[3]) {
-  out[0] = x.x, out[1] = x.y, out[2] = x.z;
-}
-
-}  // namespace
+namespace {}  // namespace
 
 World::World() : parts_(new (std::nothrow) Parts) {}
 World::World(World&&) noexcept = default;
@@ -129,11 +124,7 @@ void World::Parts::read() {
   const auto states = simulation->states();
   bodies.resize(states.size());
   for (std::uint32_t i = 0; i < states.size(); ++i) {
-    bodies[i].pose = pose_of(properties[i], states[i]).pose;
-    write(states[i].position, bodies[i].centre);
-    write(states[i].velocity, bodies[i].velocity);
-    write(states[i].angular_velocity, bodies[i].angular_velocity);
-    bodies[i].sleeps = simulation->sleeps(i);
+    bodies[i] = motion_of(properties[i], states[i], simulation->sleeps(i));
   }
 }
 
@@ -165,13 +156,7 @@ void World::Parts::take_changes() {
 void World::Parts::read_contacts() {
   contacts.clear();
   for (const ContactPoint& point : simulation->contacts()) {
-    const ContactImpulse& impulse = simulation->impulses()[contacts.size()];
-    WorldContact& contact = contacts.emplace_back();
-    contact.a = point.body_a, contact.b = point.body_b;
-    contact.depth = point.depth;
-    write(point.position, contact.position);
-    write(point.normal, contact.normal);
-    write(impulse.normal * point.normal + impulse.tangential, contact.impulse);
+    contacts.push_back(contact_of(point, simulation->impulses()[contacts.size()]));
   }
 }
 

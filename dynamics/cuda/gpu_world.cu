@@ -9,6 +9,7 @@
 #include "dynamics/cuda/cuda_questions.cuh"
 #include "dynamics/parallel/parallel_simulation.h"
 #include "dynamics/parallel/wake_step.h"
+#include "dynamics/world_rows.h"
 #include "dynamics/world_setup.h"
 #include "tandem/kernels/excluded_pairs.h"
 #include "tandem/runtime/upload.h"
@@ -65,10 +66,6 @@ struct GpuWorld::Parts {
 };
 
 namespace {
-
-void write(const Vector3& x, double (&out)[3]) {
-  out[0] = x.x, out[1] = x.y, out[2] = x.z;
-}
 
 template <typename T>
 Status read(CudaExecutor& executor, const T* from, std::size_t count, std::vector<T>& to) {
@@ -197,12 +194,7 @@ Status GpuWorld::bodies(std::span<const BodyMotion>& bodies) {
     if (status != Status::kOk) return fail(status);
     parts.bodies.resize(a.bodies);
     for (std::uint32_t i = 0; i < a.bodies; ++i) {
-      BodyMotion& to = parts.bodies[i];
-      to.pose = pose_of(parts.properties[i], parts.states[i]).pose;
-      write(parts.states[i].position, to.centre);
-      write(parts.states[i].velocity, to.velocity);
-      write(parts.states[i].angular_velocity, to.angular_velocity);
-      to.sleeps = parts.groups[i] != Sleep::kAwake;
+      parts.bodies[i] = motion_of(parts.properties[i], parts.states[i], parts.groups[i] != Sleep::kAwake);
     }
   } catch (const std::bad_alloc&) {
     return fail(Status::kOutOfMemory);
@@ -231,14 +223,7 @@ Status GpuWorld::contacts(std::span<const WorldContact>& contacts) {
     parts.contacts.clear();
     for (const PairRecord& record : parts.records) {
       for (std::uint32_t k = record.first_contact; k < record.first_contact + record.contacts; ++k) {
-        const ContactPoint& point = parts.points[k];
-        const ContactImpulse& impulse = parts.done[k];
-        WorldContact& contact = parts.contacts.emplace_back();
-        contact.a = point.body_a, contact.b = point.body_b;
-        contact.depth = point.depth;
-        write(point.position, contact.position);
-        write(point.normal, contact.normal);
-        write(impulse.normal * point.normal + impulse.tangential, contact.impulse);
+        parts.contacts.push_back(contact_of(parts.points[k], parts.done[k]));
       }
     }
   } catch (const std::bad_alloc&) {

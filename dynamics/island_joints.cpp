@@ -6,33 +6,9 @@
 namespace tandem::dynamics {
 namespace {
 
-bool is_driven(const StepInput& input, std::uint32_t body) {
-  return body != kNoIndex && input.bodies[body].motion == Motion::kinematic;
-}
-
-// The state of a body that only its own velocities move: at rest, unless it is kinematic.
-BodyState unmoved(const IslandProblem& problem, const StepInput& input, std::uint32_t body) {
-  BodyState state = state_of(body, problem.states);
-  if (!is_driven(input, body)) state.velocity = state.angular_velocity = Vector3{};
-  return state;
-}
-
-Vector6 gradient(const IslandProblem& problem, std::uint32_t place, const Vector3& linear,
-                 const Vector3& angular) {
-  if (place == 0) return {};
-  const MassScale& scale = problem.scale[place];
-  return {linear / scale.root_mass, transposed(scale.spread) * angular};
-}
-
-void set_row(const IslandProblem& problem, const StepInput& input, const JointDirection& from,
-             JointRow& row) {
-  row.gradient.a = -gradient(problem, row.a, from.linear, from.angular_a);
-  row.gradient.b = gradient(problem, row.b, from.linear, from.angular_b);
-  const Joint& joint = input.joints[row.joint];
-  row.drive = is_driven(input, joint.a) || is_driven(input, joint.b)
-                  ? from.speed_of(row.a > 0 ? BodyState() : unmoved(problem, input, joint.a),
-                                  row.b > 0 ? BodyState() : unmoved(problem, input, joint.b))
-                  : 0;
+JointedBody jointed_body(const IslandProblem& problem, const StepInput& input, std::uint32_t body,
+                         std::uint32_t place) {
+  return {body, input.bodies.data(), problem.states.data(), place > 0 ? &problem.scale[place] : nullptr};
 }
 
 JointGeometry geometry_at_start(const IslandProblem& problem, const StepInput& input, std::uint32_t joint) {
@@ -47,42 +23,11 @@ void add_joint_rows(IslandProblem& problem, const StepInput& input, std::uint32_
                     std::uint32_t b) {
   const Joint& of = input.joints[joint];
   const JointDirections from = directions_of(of, geometry_at_start(problem, input, joint));
+  const JointedBody body_a = jointed_body(problem, input, of.a, a),
+                    body_b = jointed_body(problem, input, of.b, b);
   for (std::size_t k = 0; k < from.count; ++k) {
-    const JointDirection& direction = from.row[k];
-    JointRow row = {};
-    row.joint = joint, row.kind = direction.kind, row.slot = direction.slot, row.a = a, row.b = b;
-    row.least_way = direction.least_way, row.most_way = direction.most_way;
-    row.speed = of.speed;
-    row.most_push = direction.kind == JointRowKind::motor ? input.dt * of.most_effort : INFINITY;
-    row.least_push = -row.most_push;
-    row.impulse = std::clamp(input.joint_memory[joint].impulse[row.slot], row.least_push, row.most_push);
-    set_row(problem, input, direction, row);
-    problem.joint_rows.push_back(row);
-  }
-}
-
-void follow_joints(const IslandProblem& problem, const StepInput& input,
-                   const std::vector<Vector6>& displacement, double time, std::span<JointRow> rows) {
-  const auto moved = [&](std::uint32_t body, std::uint32_t place) {
-    BodyState state = unmoved(problem, input, body);
-    Vector3 way = time * state.velocity, turn = time * state.angular_velocity;
-    if (place > 0) {
-      way = displacement[place].linear / problem.scale[place].root_mass;
-      turn = problem.scale[place].spread * displacement[place].angular;
-    }
-    state.position += way;
-    state.orientation = rotation_by(turn) * state.orientation;
-    return state;
-  };
-  for (auto row = rows.begin(); row != rows.end();) {
-    const Joint& joint = input.joints[row->joint];
-    const JointGeometry geometry = geometry_of(joint, moved(joint.a, row->a), moved(joint.b, row->b),
-                                               input.joint_memory[row->joint].position);
-    const JointDirections from = directions_of(joint, geometry);
-    for (std::size_t k = 0; k < from.count; ++k, ++row) {
-      set_row(problem, input, from.row[k], *row);
-      row->least_way = from.row[k].least_way, row->most_way = from.row[k].most_way;
-    }
+    problem.joint_rows.push_back(
+        {constraint_of(of, input.joint_memory[joint], from.row[k], body_a, body_b, input.dt), joint, a, b});
   }
 }
 
@@ -94,9 +39,9 @@ JointSpan::JointSpan(const IslandProblem& problem, const StepInput& input)
 void JointSpan::end_with(const std::vector<Vector6>& velocity, const std::vector<Vector6>& displacement) {
   const auto state = [&](std::uint32_t body, std::uint32_t place) {
     if (place > 0) return state_at_end(problem_, input_, place, velocity[place], displacement[place]);
-    BodyState at_end = unmoved(problem_, input_, body);
-    if (is_driven(input_, body)) advance(input_.bodies[body], at_end, {}, {}, input_.dt);
-    return at_end;
+    JointedBody unmoved = jointed_body(problem_, input_, body, place);
+    if (unmoved.is_driven) advance(input_.bodies[body], unmoved.start, {}, {}, input_.dt);
+    return unmoved.start;
   };
   std::size_t row = 0;
   for (std::size_t i = 0; i < problem_.joints.size(); ++i) {
@@ -159,8 +104,11 @@ template <typename Geometry>
 void JointSpan::set_rows(std::span<JointRow> rows, const Geometry& geometry) const {
   auto row = rows.begin();
   for (std::size_t i = 0; i < problem_.joints.size(); ++i) {
-    const JointDirections from = directions_of(input_.joints[problem_.joints[i]], geometry(i));
-    for (std::size_t k = 0; k < from.count; ++k, ++row) set_row(problem_, input_, from.row[k], *row);
+    const Joint& joint = input_.joints[problem_.joints[i]];
+    const JointDirections from = directions_of(joint, geometry(i));
+    const JointedBody a = jointed_body(problem_, input_, joint.a, row->a),
+                      b = jointed_body(problem_, input_, joint.b, row->b);
+    for (std::size_t k = 0; k < from.count; ++k, ++row) set_direction(from.row[k], a, b, *row);
   }
 }
 

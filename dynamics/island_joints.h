@@ -10,11 +10,6 @@ namespace tandem::dynamics {
 void add_joint_rows(IslandProblem& problem, const StepInput& input, std::uint32_t joint, std::uint32_t a,
                     std::uint32_t b);
 
-/// Makes the rows those of the bodies as they are some time after the start of the step, when they have moved
-/// by the displacement: gradients, drives and ways.
-void follow_joints(const IslandProblem& problem, const StepInput& input,
-                   const std::vector<Vector6>& displacement, double time, std::span<JointRow> rows);
-
 /// The joints of an island over a step, from states at its start to states at its end, of which a solver has
 /// guesses that become better.
 class JointSpan {

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "dynamics/contact_rows.h"
-#include "dynamics/joint.h"
+#include "dynamics/joint_rows.h"
 
 namespace tandem::dynamics {
 
@@ -30,18 +30,10 @@ struct TouchingPair {
   }
 };
 
-/// A direction in which a joint acts, and the impulse there.
-struct JointRow {
+/// A row of a joint of an island.
+struct JointRow : JointConstraint {
   std::uint32_t joint;  ///< by place in StepInput::joints
-  JointRowKind kind;
-  std::uint8_t slot;
-  std::uint32_t a, b;            ///< places of its bodies
-  ContactRow gradient;           ///< of w, but for its drive
-  double drive;                  ///< by bodies that move and are not moved
-  double least_way, most_way;    ///< see JointDirection
-  double speed;                  ///< that a motor asks for
-  double least_push, most_push;  ///< bounds of the impulse of a whole step
-  double impulse;                ///< as a whole step would need it
+  std::uint32_t a, b;   ///< places of its bodies
 
   double along(const std::vector<Vector6>& y) const { return dot(gradient.a, y[a]) + dot(gradient.b, y[b]); }
 };

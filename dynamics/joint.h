@@ -27,10 +27,10 @@ struct Joint {
   bool holds = true;  ///< false: it has broken or been removed
 
   /// Returns whether it has been removed; the simulation may put another joint in its place.
-  bool is_gone() const { return a == b; }
+  TANDEM_HD bool is_gone() const { return a == b; }
   /// Returns the bodies that it joins; the world with itself where it does not hold.
-  ObjectPair pair() const { return holds ? ObjectPair{a, b} : ObjectPair{kNoIndex, kNoIndex}; }
-  bool has_limits() const { return least > -INFINITY || most < INFINITY; }
+  TANDEM_HD ObjectPair pair() const { return holds ? ObjectPair{a, b} : ObjectPair{kNoIndex, kNoIndex}; }
+  TANDEM_HD bool has_limits() const { return least > -INFINITY || most < INFINITY; }
 };
 
 /// A joint has at most this many rows, each with a slot for what it remembers.
@@ -53,12 +53,8 @@ struct JointGeometry {
   double position = 0;
 };
 
-/// near: an angle becomes the one within half a turn of this.
-JointGeometry geometry_of(const Joint& joint, const BodyState& a, const BodyState& b, double near);
-JointGeometry middle(const JointGeometry& p, const JointGeometry& q);
-
 /// The state of the joint's body; that of the world is at rest at the origin.
-inline BodyState state_of(std::uint32_t body, std::span<const BodyState> states) {
+TANDEM_HD inline BodyState state_of(std::uint32_t body, std::span<const BodyState> states) {
   return body == kNoIndex ? BodyState() : states[body];
 }
 
@@ -76,7 +72,7 @@ struct JointDirection {
   Vector3 linear, angular_a, angular_b;
   double least_way, most_way;  ///< by which w may still change what it changes; equal of one that is held
 
-  double speed_of(const BodyState& a, const BodyState& b) const {
+  TANDEM_HD double speed_of(const BodyState& a, const BodyState& b) const {
     return dot(linear, b.velocity - a.velocity) + dot(angular_b, b.angular_velocity) -
            dot(angular_a, a.angular_velocity);
   }
@@ -87,22 +83,11 @@ struct JointDirections {
   std::size_t count = 0;
 };
 
-/// The directions of a joint; how many, and their slots, depend on the joint alone.
-JointDirections directions_of(const Joint& joint, const JointGeometry& geometry);
-
 /// The impulse of a joint in a step, on b at its anchor; on a there the opposite one.
 struct JointImpulse {
   Vector3 linear, turning;
   double motor = 0;  ///< along the axis, of the motor alone
 };
-JointImpulse impulse_of(const Joint& joint, const JointMemory& memory, const BodyState& a,
-                        const BodyState& b);
-
-/// Returns the speed by which the joint's position changes; 0 of a joint that has none.
-double free_speed(const Joint& joint, const JointGeometry& geometry, const BodyState& a, const BodyState& b);
-
-/// Takes where the joint is after bodies have moved for a time. Its speed says how often a hinge has turned.
-void follow(const Joint& joint, const BodyState& a, const BodyState& b, double time, JointMemory& memory);
 
 /// Returns whether the joint's anchors, limits, motor, axis and breaking limits are such as its kind can
 /// have; kJoinsNothing is the caller's. Result: kOk, kBadJoint or kNoAxis.

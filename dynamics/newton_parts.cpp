@@ -4,6 +4,8 @@
 #include <numeric>
 #include <vector>
 
+#include "dynamics/joint_rules.h"
+
 namespace tandem::dynamics {
 namespace {
 

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <iterator>
 
+#include "dynamics/joint_order.h"
+#include "dynamics/joint_rules.h"
 #include "kernels/common/stopwatch.h"
 
 namespace tandem::dynamics {
@@ -151,7 +153,8 @@ std::vector<ContactImpulse> Simulation::solve_contacts() {
                        threads_,
                        joints_,
                        joint_memory_,
-                       done_},
+                       done_,
+                       joint_colours_},
                       states_, impulses);
   return impulses;
 }
@@ -308,6 +311,7 @@ void Simulation::remove_joint(std::uint32_t joint) {
 void Simulation::find_joined() {
   joined_.clear();
   for (const Joint& joint : joints_) joined_.push_back(joint.pair());
+  joint_colours_ = find_joint_colours(joints_, bodies_);
 }
 
 void Simulation::wake_joined(const Joint& joint) {

@@ -162,6 +162,7 @@ class Simulation {
   std::vector<Joint> joints_;
   std::vector<ObjectPair> joined_;  // the bodies of each
   std::vector<JointMemory> joint_memory_;
+  std::vector<std::uint32_t> joint_colours_;
   std::vector<std::uint32_t> broken_;  // in the last step
   Islands islands_;
   std::vector<ContactPoint> found_;

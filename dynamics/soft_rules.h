@@ -65,6 +65,11 @@ TANDEM_HD inline Vector3 first_three(const float (&from)[4]) {
   return {unsigned_zero(from[0]), unsigned_zero(from[1]), unsigned_zero(from[2])};
 }
 
+/// Returns the y of a motion, or of a way.
+TANDEM_HD inline Vector6 added_motion(const MassScale& scale, const SoftMotion& motion) {
+  return {scale.root_mass * first_three(motion.centre), first_three(motion.spin)};
+}
+
 /// Returns a body that contacts move.
 TANDEM_HD inline SteppedBody soft_body(const SoftNumbers& step, double unit_root, std::uint32_t body) {
   SteppedBody out = step.rows.body(body);
@@ -193,11 +198,8 @@ TANDEM_HD inline void work_on(BodyWork work, float h, const SoftMotion& gain, So
 TANDEM_HD inline void end_step(const BodyProperties& properties, const SteppedBody& body,
                                const SoftMotion& velocity, const SoftMotion& moved, double dt,
                                BodyState& state) {
-  const auto added = [&](const SoftMotion& motion) {
-    return Vector6{body.scale.root_mass * first_three(motion.centre), first_three(motion.spin)};
-  };
-  apply_motion(properties, body.scale, body.velocity + added(velocity), dt * body.velocity + added(moved), dt,
-               state);
+  apply_motion(properties, body.scale, body.velocity + added_motion(body.scale, velocity),
+               dt * body.velocity + added_motion(body.scale, moved), dt, state);
 }
 
 /// Writes the impulses of a pair's contacts. impulses, done: of all contacts; see StepSolver and StepInput;

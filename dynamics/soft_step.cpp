@@ -31,10 +31,9 @@ Residual SoftSolver::solve(const StepInput& input, std::span<const std::uint32_t
   find_unit(step);
   make_groups(step);
   fill(step);
-  joints_.start(input, islands, states, place_, bodies_, options.substeps, unit_root_ * unit_root_);
+  joints_.start(input, islands, states, place_, bodies_, step.numbers, unit_root_);
   run(step);
   write(step, states, impulses);
-  joints_.sum_up();
   joints_.write(input.joint_memory);
   return residual();
 }
@@ -207,15 +206,15 @@ void SoftSolver::run(const Step& step) {
     Work work;
     SweepPart part = {};
     SoftPasses::Pass pass = nullptr;
-    float time = 0;
+    double time = 0;
   };
   std::vector<Phase> phases;
   const auto add_sweep = [&](SoftPasses::Pass pass, double time = 0) {
-    for (const SweepPart& part : parts_) phases.push_back({Work::pass, part, pass, static_cast<float>(time)});
+    for (const SweepPart& part : parts_) phases.push_back({Work::pass, part, pass, time});
   };
   static const SoftPasses& passes = *best_way<const SoftPasses*>(soft_passes);
   const auto add_joints = [&](Work work, double time = 0) {
-    if (!joints_.empty()) phases.push_back({work, {}, nullptr, static_cast<float>(time)});
+    if (!joints_.empty()) phases.push_back({work, {}, nullptr, time});
   };
   add_sweep(passes.start);
   add_joints(Work::push_joints);
@@ -236,34 +235,34 @@ void SoftSolver::run(const Step& step) {
   }
   add_sweep(passes.judge);
   const SoftRows rows = rows_of(step);
-  run_phases(step.input.threads, regions_, phases.size(),
-             [&](std::size_t phase, std::uint32_t i, std::uint32_t n) {
-               const auto& [work, part, pass, time] = phases[phase];
-               if (work > Work::move) {
-                 if (i == 0) work_on_joints(step, work, time);
-               } else if (work != Work::pass) {
-                 const auto [begin, end] = part_of(body_.size(), i, n);
-                 for (std::size_t j = begin; j < end; ++j)
-                   work_on(work == Work::begin        ? BodyWork::begin
-                           : work == Work::accelerate ? BodyWork::accelerate
-                                                      : BodyWork::move,
-                           static_cast<float>(h), gains_[j], start_[j], velocities_[j], moved_[j]);
-               } else if (part.region_begin != nullptr) {
-                 for (std::uint32_t region = i; region < regions_; region += n)
-                   pass(rows, part.region_begin[region], part.region_begin[region + 1], time);
-               } else if (i == 0) {
-                 pass(rows, part.begin, part.end, time);
-               }
-             });
+  run_phases(
+      step.input.threads, regions_, phases.size(), [&](std::size_t phase, std::uint32_t i, std::uint32_t n) {
+        const auto& [work, part, pass, time] = phases[phase];
+        if (work > Work::move) {
+          if (i == 0) work_on_joints(work, time);
+        } else if (work != Work::pass) {
+          const auto [begin, end] = part_of(body_.size(), i, n);
+          for (std::size_t j = begin; j < end; ++j)
+            work_on(work == Work::begin        ? BodyWork::begin
+                    : work == Work::accelerate ? BodyWork::accelerate
+                                               : BodyWork::move,
+                    static_cast<float>(h), gains_[j], start_[j], velocities_[j], moved_[j]);
+        } else if (part.region_begin != nullptr) {
+          for (std::uint32_t region = i; region < regions_; region += n)
+            pass(rows, part.region_begin[region], part.region_begin[region + 1], static_cast<float>(time));
+        } else if (i == 0) {
+          pass(rows, part.begin, part.end, static_cast<float>(time));
+        }
+      });
 }
 
-void SoftSolver::work_on_joints(const Step& step, Work work, double time) {
+void SoftSolver::work_on_joints(Work work, double time) {
   if (work == Work::push_joints) return joints_.push(velocities_);
   if (work == Work::follow_joints) return joints_.follow(moved_, time);
-  if (work == Work::visit_joints) return joints_.visit(velocities_, step.numbers.h, nullptr);
+  if (work == Work::visit_joints) return joints_.visit(velocities_, false);
   if (time > 0) joints_.sum_up();  // of the substep before
   joints_.add_due(velocities_);
-  joints_.visit(velocities_, step.numbers.h, &step.numbers.against_unmoved);
+  joints_.visit(velocities_, true);
 }
 
 void SoftSolver::write(const Step& step, std::span<BodyState> states, std::span<ContactImpulse> impulses) {

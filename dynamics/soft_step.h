@@ -64,7 +64,7 @@ class SoftSolver {
   void fill(const Step& step);
   SoftRows rows_of(const Step& step);
   void run(const Step& step);
-  void work_on_joints(const Step& step, Work work, double time);
+  void work_on_joints(Work work, double time);
   void write(const Step& step, std::span<BodyState> states, std::span<ContactImpulse> impulses);
   Residual residual() const;
 

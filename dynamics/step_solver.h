@@ -74,6 +74,7 @@ struct StepInput : StepBodies {
   /// A result: what each contact did in the step, which in soft steps is not what the next step starts with;
   /// empty: nobody asks.
   std::span<ContactImpulse> done = {};
+  std::span<const std::uint32_t> joint_colours = {};  ///< see find_joint_colours()
 };
 
 /// Says what a solution leaves undone: the natural map of the complementarity problem, row by row the

@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <vector>
 
+#include "dynamics/joint_rules.h"
 #include "dynamics/lists_of_steps.h"
 #include "dynamics/scene_contacts.h"
 #include "dynamics/simulation.h"

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "dynamics/joint_rules.h"
+
 namespace tandem::dynamics {
 namespace {
 
@@ -11,6 +13,22 @@ bool has_axis(JointKind kind) {
 }
 
 }  // namespace
+
+Joint gone_joint() {
+  Joint joint = {};
+  joint.a = joint.b = kNoIndex, joint.holds = false;
+  return joint;
+}
+
+std::uint32_t free_place(std::span<const Joint> joints) {
+  return static_cast<std::uint32_t>(std::ranges::find_if(joints, &Joint::is_gone) - joints.begin());
+}
+
+JointMemory memory_of(const Joint& joint, std::span<const BodyState> states) {
+  JointMemory memory;
+  follow(joint, state_of(joint.a, states), state_of(joint.b, states), 0, memory);
+  return memory;
+}
 
 Status check(const JointDescription& from) {
   const bool has_limits = from.least > -INFINITY || from.most < INFINITY;

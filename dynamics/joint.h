@@ -30,6 +30,8 @@ struct Joint {
   TANDEM_HD bool is_gone() const { return a == b; }
   /// Returns the bodies that it joins; the world with itself where it does not hold.
   TANDEM_HD ObjectPair pair() const { return holds ? ObjectPair{a, b} : ObjectPair{kNoIndex, kNoIndex}; }
+  /// Returns whether a motor moves it, which keeps its bodies awake.
+  TANDEM_HD bool is_driven() const { return holds && speed != 0 && most_effort > 0; }
   TANDEM_HD bool has_limits() const { return least > -INFINITY || most < INFINITY; }
 };
 
@@ -88,6 +90,13 @@ struct JointImpulse {
   Vector3 linear, turning;
   double motor = 0;  ///< along the axis, of the motor alone
 };
+
+/// Returns a joint that has been removed, and the first place of one in a list, or the place behind all.
+Joint gone_joint();
+std::uint32_t free_place(std::span<const Joint> joints);
+
+/// Returns what a joint of bodies that stand like this keeps, before its first step.
+JointMemory memory_of(const Joint& joint, std::span<const BodyState> states);
 
 /// Returns whether the joint's anchors, limits, motor, axis and breaking limits are such as its kind can
 /// have; kJoinsNothing is the caller's. Result: kOk, kBadJoint or kNoAxis.

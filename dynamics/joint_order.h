@@ -7,10 +7,12 @@
 
 namespace tandem::dynamics {
 
+/// Returns the motions of bodies, as find_joint_colours() takes them.
+std::vector<Motion> motions_of(std::span<const BodyProperties> bodies);
+
 /// Returns the colour of each joint. A soft step visits joints by ascending colour; no two of a colour that
 /// hold have a moving body in common.
-std::vector<std::uint32_t> find_joint_colours(std::span<const Joint> joints,
-                                              std::span<const BodyProperties> bodies);
+std::vector<std::uint32_t> find_joint_colours(std::span<const Joint> joints, std::span<const Motion> motions);
 
 /// Joints that one team visits at once are of one colour.
 inline constexpr std::uint32_t kJointsOfTeam = 32;
@@ -29,6 +31,6 @@ struct JointOrder {
 
   std::uint32_t tasks() const { return static_cast<std::uint32_t>(places.size() / kJointsOfTeam); }
 };
-JointOrder find_joint_order(std::span<const Joint> joints, std::span<const BodyProperties> bodies);
+JointOrder find_joint_order(std::span<const Joint> joints, std::span<const Motion> motions);
 
 }  // namespace tandem::dynamics

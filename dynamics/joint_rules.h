@@ -69,7 +69,8 @@ class DirectionMaker {
 }  // namespace joint_rules_detail
 
 /// near: an angle becomes the one within half a turn of this.
-TANDEM_HD inline JointGeometry geometry_of(const Joint& joint, const BodyState& a, const BodyState& b, double near) {
+TANDEM_HD inline JointGeometry geometry_of(const Joint& joint, const BodyState& a, const BodyState& b,
+                                           double near) {
   JointGeometry g;
   g.arm_a = rotated(a.orientation, joint.anchor_a);
   g.arm_b = rotated(b.orientation, joint.anchor_b);
@@ -108,7 +109,8 @@ TANDEM_HD inline JointGeometry middle(const JointGeometry& p, const JointGeometr
 }
 
 /// Returns the speed by which the joint's position changes; 0 of a joint that has none.
-TANDEM_HD inline double free_speed(const Joint& joint, const JointGeometry& g, const BodyState& a, const BodyState& b) {
+TANDEM_HD inline double free_speed(const Joint& joint, const JointGeometry& g, const BodyState& a,
+                                   const BodyState& b) {
   const joint_rules_detail::DirectionMaker rows(g);
   switch (joint.kind) {
     case JointKind::hinge:
@@ -123,7 +125,8 @@ TANDEM_HD inline double free_speed(const Joint& joint, const JointGeometry& g, c
 }
 
 /// Takes where the joint is after bodies have moved for a time. Its speed says how often a hinge has turned.
-TANDEM_HD inline void follow(const Joint& joint, const BodyState& a, const BodyState& b, double time, JointMemory& memory) {
+TANDEM_HD inline void follow(const Joint& joint, const BodyState& a, const BodyState& b, double time,
+                             JointMemory& memory) {
   const double speed = joint.kind == JointKind::hinge ? dot(rotated(a.orientation, joint.axis_a),
                                                             b.angular_velocity - a.angular_velocity)
                                                       : 0;
@@ -158,7 +161,7 @@ TANDEM_HD inline JointDirections directions_of(const Joint& joint, const JointGe
 
 /// Returns a joint's impulse in the last step.
 TANDEM_HD inline JointImpulse impulse_of(const Joint& joint, const JointMemory& memory, const BodyState& a,
-                        const BodyState& b) {
+                                         const BodyState& b) {
   const JointGeometry geometry = geometry_of(joint, a, b, memory.position);
   const JointDirections directions = directions_of(joint, geometry);
   JointImpulse sum;
@@ -170,6 +173,15 @@ TANDEM_HD inline JointImpulse impulse_of(const Joint& joint, const JointMemory& 
     if (row.kind == JointRowKind::motor) sum.motor = push;
   }
   return sum;
+}
+
+/// Returns whether a joint breaks that did this in a step of dt seconds.
+TANDEM_HD inline bool breaks(const Joint& joint, const JointMemory& memory, const BodyState& a,
+                             const BodyState& b, double dt) {
+  if (joint.breaking_force == INFINITY && joint.breaking_torque == INFINITY) return false;
+  const JointImpulse impulse = impulse_of(joint, memory, a, b);
+  return norm(impulse.linear) > dt * joint.breaking_force ||
+         norm(impulse.turning) > dt * joint.breaking_torque;
 }
 
 }  // namespace tandem::dynamics

@@ -176,8 +176,7 @@ bool Simulation::find_missed(std::span<const BodyState> before) {
 void Simulation::sleep() {
   if (!options_.sleep.enabled) return;
   std::vector<std::uint8_t> driven;
-  for (const Joint& joint : joints_)
-    driven.push_back(joint.holds && joint.speed != 0 && joint.most_effort > 0);
+  for (const Joint& joint : joints_) driven.push_back(joint.is_driven());
   sleep_.wake_touched(acting_, cache_.contacts(), joined_);
   wake_beside_placed();
   sleep_.fall_asleep(bodies_, states_, islands_, options_.sleep, options_.dt, driven);
@@ -284,15 +283,13 @@ void Simulation::set_motor(std::uint32_t joint, double speed, double most_effort
 }
 
 std::uint32_t Simulation::add_joint(const Joint& joint) {
-  const auto free = std::ranges::find_if(joints_, &Joint::is_gone);
-  const auto place = static_cast<std::uint32_t>(free - joints_.begin());
+  const std::uint32_t place = free_place(joints_);
   // What may throw comes first.
   if (!joint.may_touch) forget_contacts({std::min(joint.a, joint.b), std::max(joint.a, joint.b)});
   const std::size_t count = std::max<std::size_t>(joints_.size(), place + 1);
   joint_memory_.reserve(count), joined_.reserve(count), joints_.resize(count), joint_memory_.resize(count);
   joints_[place] = joint;
-  joint_memory_[place] = {};
-  follow(joint, state_of(joint.a, states_), state_of(joint.b, states_), 0, joint_memory_[place]);
+  joint_memory_[place] = memory_of(joint, states_);
   find_joined();
   wake_joined(joint);
   update_acting();
@@ -301,8 +298,7 @@ std::uint32_t Simulation::add_joint(const Joint& joint) {
 
 void Simulation::remove_joint(std::uint32_t joint) {
   wake_joined(joints_[joint]);
-  joints_[joint] = {};
-  joints_[joint].a = joints_[joint].b = kNoIndex, joints_[joint].holds = false;
+  joints_[joint] = gone_joint();
   joint_memory_[joint] = {};
   find_joined();
   update_acting();
@@ -311,7 +307,7 @@ void Simulation::remove_joint(std::uint32_t joint) {
 void Simulation::find_joined() {
   joined_.clear();
   for (const Joint& joint : joints_) joined_.push_back(joint.pair());
-  joint_colours_ = find_joint_colours(joints_, bodies_);
+  joint_colours_ = find_joint_colours(joints_, motions_of(bodies_));
 }
 
 void Simulation::wake_joined(const Joint& joint) {
@@ -340,11 +336,7 @@ void Simulation::break_joints() {
   }
   for (const std::uint32_t i : islands_.joints) {
     const Joint& joint = joints_[i];
-    if (joint.breaking_force == INFINITY && joint.breaking_torque == INFINITY) continue;
-    const JointImpulse impulse =
-        impulse_of(joint, joint_memory_[i], state_of(joint.a, states_), state_of(joint.b, states_));
-    if (norm(impulse.linear) > options_.dt * joint.breaking_force ||
-        norm(impulse.turning) > options_.dt * joint.breaking_torque)
+    if (breaks(joint, joint_memory_[i], state_of(joint.a, states_), state_of(joint.b, states_), options_.dt))
       broken_.push_back(i);
   }
   std::ranges::sort(broken_);

@@ -18,9 +18,9 @@ void SoftJoints::start(const StepInput& input, std::span<const std::uint32_t> is
   std::ranges::stable_sort(order, {}, [&](std::uint32_t joint) { return input.joint_colours[joint]; });
   joints_.clear(), joints_.reserve(order.size());
   const auto place_of = [&](std::uint32_t body) { return numbers.rows.is_moved(body) ? place[body] : 0; };
-  const auto body = [&](std::uint32_t body) {
-    const std::uint32_t at = place_of(body);
-    return SoftJointBody(body, input.bodies.data(), states.data(), at > 0 ? &bodies[at] : nullptr);
+  const auto body = [&](std::uint32_t i) {
+    const std::uint32_t at = place_of(i);
+    return SoftJointBody(i, input.bodies.data(), states.data(), at > 0 ? &bodies[at] : nullptr);
   };
   for (const std::uint32_t joint : order) {
     const Joint& of = input.joints[joint];

@@ -7,7 +7,6 @@
 #include <stdexcept>
 #include <vector>
 
-#include "dynamics/joint_rules.h"
 #include "dynamics/lists_of_steps.h"
 #include "dynamics/scene_contacts.h"
 #include "dynamics/simulation.h"
@@ -131,13 +130,8 @@ void World::Parts::read() {
 
 // Lets the simulation look past pairs that are excluded, or joined and may not touch.
 Status World::Parts::filter_pairs(std::span<const Joint> joined) {
-  std::vector<ObjectPair> pairs = excluded;
-  for (const Joint& joint : joined) {
-    if (joint.holds && !joint.may_touch && joint.a != kNoIndex && joint.b != kNoIndex)
-      pairs.push_back(joint.pair());
-  }
   ExcludedPairTable table;
-  const Status status = table.set(pairs);
+  const Status status = exclude_joined(excluded, joined, table);
   if (status != Status::kOk) return status;
   apart = std::move(table);
   const bool one_world = std::ranges::all_of(world, [](std::uint32_t w) { return w == kEveryWorld; });
@@ -166,14 +160,7 @@ void World::Parts::read_joints() {
   for (std::size_t i = 0; i < joints.size(); ++i) {
     const Joint& joint = simulation->joints()[i];
     if (joint.is_gone()) continue;
-    const JointMemory& memory = simulation->joint_memory()[i];
-    const auto states = simulation->states();
-    const BodyState a = state_of(joint.a, states), b = state_of(joint.b, states);
-    const JointImpulse impulse = impulse_of(joint, memory, a, b);
-    const double speed = free_speed(joint, geometry_of(joint, a, b, memory.position), a, b);
-    joints[i] = {memory.position, speed, {}, {}, impulse.motor / dt, joint.holds};
-    write(impulse.linear, joints[i].impulse);
-    write(impulse.turning, joints[i].turning);
+    joints[i] = joint_of(joint, simulation->joint_memory()[i], simulation->states(), dt);
   }
 }
 

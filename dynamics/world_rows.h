@@ -1,5 +1,6 @@
 #pragma once
 #include "dynamics/contact_point.h"
+#include "dynamics/joint_rules.h"
 #include "tandem/dynamics/world.h"
 
 /// What callers of a world see of bodies and contacts.
@@ -27,6 +28,18 @@ inline WorldContact contact_of(const ContactPoint& point, const ContactImpulse& 
   write(point.position, to.position);
   write(point.normal, to.normal);
   write(impulse.normal * point.normal + impulse.tangential, to.impulse);
+  return to;
+}
+
+/// dt: seconds of the last step. states: of all bodies, at its end.
+inline WorldJoint joint_of(const Joint& joint, const JointMemory& memory, std::span<const BodyState> states,
+                           double dt) {
+  const BodyState a = state_of(joint.a, states), b = state_of(joint.b, states);
+  const JointImpulse impulse = impulse_of(joint, memory, a, b);
+  const double speed = free_speed(joint, geometry_of(joint, a, b, memory.position), a, b);
+  WorldJoint to = {memory.position, speed, {}, {}, impulse.motor / dt, joint.holds};
+  write(impulse.linear, to.impulse);
+  write(impulse.turning, to.turning);
   return to;
 }
 

@@ -77,6 +77,16 @@ SimulationOptions simulation_options(const WorldOptions& options, std::span<cons
 
 }  // namespace
 
+Status exclude_joined(std::span<const ObjectPair> excluded, std::span<const Joint> joints,
+                      ExcludedPairTable& table) {
+  std::vector<ObjectPair> pairs(excluded.begin(), excluded.end());
+  for (const Joint& joint : joints) {
+    if (joint.holds && !joint.may_touch && joint.a != kNoIndex && joint.b != kNoIndex)
+      pairs.push_back(joint.pair());
+  }
+  return table.set(pairs);
+}
+
 bool is_usable(const BodySettings& body) {
   const Material& material = body.material;
   return is_option(body.gravity_scale, -kMost, kMost) && material.friction <= kMost &&

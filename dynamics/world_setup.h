@@ -5,6 +5,7 @@
 
 #include "dynamics/simulation.h"
 #include "tandem/dynamics/world.h"
+#include "tandem/kernels/excluded_pairs.h"
 
 namespace tandem::dynamics {
 
@@ -22,6 +23,11 @@ struct WorldSetup {
 Status set_up(std::span<const AssetView> assets, std::span<const BodyDescription> bodies,
               const WorldOptions& options, std::span<const JointDescription> joints, WorldSetup& setup,
               std::uint64_t& where);
+
+/// Makes the table of pairs that do not meet: those that are excluded, or joined and may not touch. Result:
+/// as of ExcludedPairTable::set(). Throws std::bad_alloc.
+Status exclude_joined(std::span<const ObjectPair> excluded, std::span<const Joint> joints,
+                      ExcludedPairTable& table);
 
 /// Returns whether a body may have these numbers.
 bool is_usable(const BodySettings& body);

@@ -6,8 +6,10 @@
 #include <vector>
 
 #include "dynamics/parallel/pair_step.h"
+#include "dynamics/parallel/parallel_joints.h"
 #include "dynamics/parallel/sleep_step.h"
 #include "dynamics/parallel/soft_step.h"
+#include "dynamics/parallel/wake_step.h"
 
 namespace tandem::dynamics {
 
@@ -18,6 +20,11 @@ struct StatesGoOn {
   BodyState *before, *start;
   const BodyState* end;
   TANDEM_HD void operator()(std::uint32_t i) const { before[i] = start[i], start[i] = end[i]; }
+};
+
+struct JointsGoOn {
+  JointArrays joints;
+  TANDEM_HD void operator()(std::uint32_t i) const { go_on(joints, i); }
 };
 
 struct CountsGoOn {
@@ -33,6 +40,7 @@ struct ParallelBodies {
   std::span<const BodyState> states;
   std::span<const double> inner_radii;  ///< of each shape, see inner_radii()
   std::span<const AssetBox> boxes;      ///< of each shape
+  std::span<const Joint> joints = {};
 };
 
 struct ParallelOptions {
@@ -63,9 +71,10 @@ class ParallelSimulation {
     options_ = options;
     within_ = 0, has_forces_ = false, ++generation_;
     most_pairs_ = most_moved_ = most_found_ = most_remembered_ = 0;
-    for (Status status : {reserve_bodies(bodies), reserve_pairs(std::max(1024u, 8 * bodies_)),
-                          reserve_moved(std::max(256u, bodies_ / 2)),
-                          reserve_contacts(std::max(4096u, 32 * bodies_), std::max(4096u, 32 * bodies_))}) {
+    for (Status status :
+         {joints_.set(to_, bodies.joints, bodies.properties, bodies.states), reserve_bodies(bodies),
+          reserve_pairs(std::max(1024u, 8 * bodies_)), reserve_moved(std::max(256u, bodies_ / 2)),
+          reserve_contacts(std::max(4096u, 32 * bodies_), std::max(4096u, 32 * bodies_))}) {
       if (status != Status::kOk) return status;
     }
     return put(counts_, StepCounts{});
@@ -86,6 +95,7 @@ class ParallelSimulation {
         PairStep<Executor, Questions>{to_, ask_, a}.finish();
         sleep_step(to_, a, options_.sleep);
         to_.for_each(nullptr, bodies_, parallel_simulation_detail::StatesGoOn{a.before, a.start, a.end});
+        to_.for_each(nullptr, a.joints.count, parallel_simulation_detail::JointsGoOn{a.joints});
         to_.once(parallel_simulation_detail::CountsGoOn{a.counts});
       });
       return go_on();
@@ -104,6 +114,33 @@ class ParallelSimulation {
     is_new = !(before == force);
     return to_.copy(std::span<const BodyForce>(&force, 1), forces_.data() + body);
   }
+
+  /// The joints, by the place of each: what Simulation's functions of these names do. That joined bodies meet
+  /// or do not is up to the questions, which call questions_change() where they do something else than
+  /// before.
+  std::span<const Joint> joints() const { return joints_.all(); }
+  std::span<const std::uint32_t> broken() const { return joints_.broken(); }
+  Status joint_memory(std::vector<JointMemory>& memory) const { return joints_.read(to_, memory); }
+  Status set_motor(std::uint32_t joint, double speed, double most_effort) {
+    wake_joined(to_, arrays(), joints_.all()[joint]);
+    return joints_.set_motor(to_, joint, speed, most_effort);
+  }
+  /// bodies, states: all, as they stand.
+  Status add_joint(const Joint& joint, std::span<const BodyProperties> bodies,
+                   std::span<const BodyState> states, std::uint32_t& place) {
+    if (!joint.may_touch)
+      forget_contacts(to_, arrays(), {std::min(joint.a, joint.b), std::max(joint.a, joint.b)});
+    const Status status = joints_.add(to_, joint, bodies, states, place);
+    ++generation_;
+    if (status == Status::kOk) wake_joined(to_, arrays(), joint);
+    return status;
+  }
+  Status remove_joint(std::uint32_t joint) {
+    wake_joined(to_, arrays(), joints_.all()[joint]);
+    ++generation_;
+    return joints_.remove(to_, joint);
+  }
+  void questions_change() { ++generation_; }
 
   std::uint32_t bodies() const { return bodies_; }
   std::uint32_t bad_body() const { return read_.bad_body; }
@@ -135,6 +172,7 @@ class ParallelSimulation {
     a.contacts = contacts_.data(), a.place = place_.data(), a.contact_marks = contact_marks_.data();
     a.impulses_before = impulses_before_.data(), a.impulses = impulses_.data(), a.done = done_.data();
     a.counts = counts_.data();
+    a.joints = joints_.arrays(&a.counts->broken);
     a.dt = dt, a.gravity = options_.gravity, a.options = options_.solver;
     return a;
   }
@@ -184,7 +222,7 @@ class ParallelSimulation {
   void solve(const StepArrays& a) {
     solver_.step(to_,
                  {a.acting, a.start, a.pulls, a.bodies, a.contacts, a.impulses_before, a.touching,
-                  &a.counts->touching, a.most_pairs, a.dt},
+                  &a.counts->touching, a.most_pairs, a.dt, a.joints},
                  a.options, {a.end, a.impulses, a.done});
   }
 
@@ -228,9 +266,11 @@ class ParallelSimulation {
     constexpr double kWide = 3;
     std::swap(records_[0], records_[1]), std::swap(remembered_[0], remembered_[1]);
     parity_ = 1 - parity_;
+    if (read_.broken > 0) ++generation_;
+    const Status joints = joints_.take_broken(to_, read_.broken > 0);
     const double needed = read_.reach.farthest(0.5 * options_.solver.slop);
     if (kWide * needed < within_) within_ = 1.5 * needed, ++generation_;
-    return to_.status();
+    return joints == Status::kOk ? to_.status() : joints;
   }
 
   template <typename T>
@@ -315,6 +355,7 @@ class ParallelSimulation {
   Executor& to_;
   Questions& ask_;
   ParallelSoftStep<Executor> solver_;
+  ParallelJoints<Executor> joints_;
   ParallelOptions options_;
   std::uint32_t bodies_ = 0, most_pairs_ = 0, most_moved_ = 0, most_found_ = 0, most_remembered_ = 0;
   double within_ = 0;  // how far apart near pairs are

@@ -47,6 +47,32 @@ TANDEM_HD inline void wake_touched(const StepArrays& a, const ObjectPair& pair) 
   wakes(pair.a, pair.b), wakes(pair.b, pair.a);
 }
 
+// A joint keeps its island, and wakes the body that sleeps if the other is awake and moves; once it has
+// broken it wakes both.
+TANDEM_HD inline void mark_joined(const StepArrays& a, std::uint32_t i) {
+  Joint joint = a.joints.joints[i];
+  if (!joint.holds) return;
+  const bool broke = a.joints.broke[i] != 0;
+  joint.holds = !broke;
+  bool is_awake = false, sleeps = false;
+  for (const std::uint32_t body : {joint.a, joint.b}) {
+    if (body == kNoIndex) continue;
+    const bool of_body = a.group[body] != Sleep::kAwake;
+    sleeps = sleeps || of_body, is_awake = is_awake || (!of_body && a.acting[body].motion != Motion::fixed);
+    if (!a.is_moved(body)) continue;
+    mark(a, a.label[body], kTouches);
+    if (joint.is_driven()) mark(a, a.label[body], kRestless);
+  }
+  if (!broke && !(is_awake && sleeps)) return;
+  for (const std::uint32_t body : {joint.a, joint.b}) {
+    if (body == kNoIndex) continue;
+    if (a.group[body] != Sleep::kAwake)
+      mark(a, a.group[body], kWoken);
+    else if (broke)
+      mark(a, body, kWoken);
+  }
+}
+
 TANDEM_HD inline void wake(const StepArrays& a, std::uint32_t i) {
   const std::uint32_t by = a.group[i] != Sleep::kAwake ? a.group[i] : i;
   if ((a.marks[by] & kWoken) != 0) a.group[i] = Sleep::kAwake, a.quiet[i] = 0;
@@ -86,6 +112,11 @@ void sleep_step(Executor& to, const StepArrays& a, const SleepOptions& options) 
     const ContactPair& pair = of.touching[i];
     if (of.is_moved(pair.a) && of.is_moved(pair.b)) join(of.label, pair.a, pair.b);
   });
+  to.for_each(nullptr, a.joints.count, [of] TANDEM_HD(std::uint32_t i) {
+    const ObjectPair pair = of.joints.joints[i].pair();
+    if (pair.a != kNoIndex && pair.b != kNoIndex && of.is_moved(pair.a) && of.is_moved(pair.b))
+      join(of.label, pair.a, pair.b);
+  });
   to.for_each(nullptr, a.bodies, [of] TANDEM_HD(std::uint32_t i) { of.label[i] = first_of(of.label, i); });
   to.for_each(&of.counts->pairs, a.most_pairs, [of] TANDEM_HD(std::uint32_t i) {
     const PairRecord& record = of.records[i];
@@ -95,6 +126,7 @@ void sleep_step(Executor& to, const StepArrays& a, const SleepOptions& options) 
     }
     wake_touched(of, record.pair);
   });
+  to.for_each(nullptr, a.joints.count, [of] TANDEM_HD(std::uint32_t i) { mark_joined(of, i); });
   to.for_each(nullptr, a.bodies, [of] TANDEM_HD(std::uint32_t i) { wake(of, i); });
   to.for_each(nullptr, a.bodies, [of, by] TANDEM_HD(std::uint32_t i) { count_quiet(of, i, by); });
   to.for_each(nullptr, a.bodies, [of] TANDEM_HD(std::uint32_t i) { fall_asleep(of, i); });

@@ -4,6 +4,7 @@
 #include <optional>
 #include <span>
 
+#include "dynamics/parallel/joint_step.h"
 #include "dynamics/parallel/pair_groups.h"
 #include "dynamics/parallel/soft_sweeps.h"
 
@@ -22,6 +23,7 @@ struct SoftStepInput {
   const std::uint32_t* pair_count;  ///< how many
   std::uint32_t most_pairs;         ///< how many there is room for
   double dt;
+  JointArrays joints = {};
 };
 
 /// What a step writes. Each array may be the one of the input that it follows from.
@@ -64,13 +66,21 @@ struct SoftStepView {
   std::uint32_t* bounces;
 
   TANDEM_HD double unit_root() const { return unit_root_of(groups.colouring.numbers->most_mass); }
-  TANDEM_HD bool is_held(std::uint32_t body) const { return groups.colouring.pairs_of[body] > 0; }
+  TANDEM_HD bool is_held(std::uint32_t body) const {
+    return groups.colouring.pairs_of[body] > 0 ||
+           (input.bodies[body].motion == Motion::moving && input.joints.hold(body));
+  }
+  TANDEM_HD JointSweeps joints() const {
+    return {input.joints, SoftJointNumbers(numbers), input.bodies, input.states,
+            bodies,       groups.colouring.pairs_of, groups.needs};
+  }
 };
 
 namespace soft_step_detail {
 
 TANDEM_HD inline void fill_body(const SoftStepView& view, std::uint32_t i) {
   if (i == 0) *view.bounces = 0, *view.sweeps.arrived = 0;
+  if (i == 0 && view.input.joints.count > 0) *view.input.joints.broken = 0;
   view.sweeps.velocities[i] = {}, view.sweeps.moved[i] = {};
   if (!view.is_held(i)) return;
   view.bodies[i] = soft_body(view.numbers, view.unit_root(), i);
@@ -148,7 +158,7 @@ TANDEM_HD inline void end_lane(const SoftStepView& view, std::uint32_t i) {
 
 }  // namespace soft_step_detail
 
-/// Does what SoftSolver does, without joints, side by side; and moves the bodies that nothing holds. The
+/// Does what SoftSolver does, side by side; and moves the bodies that nothing holds. The
 /// bytes of states and impulses are those of SoftSolver. Executor: HostExecutor or CudaExecutor; nothing
 /// waits for a GPU but reserve(), so that a step can be captured in a graph.
 template <typename Executor>
@@ -198,7 +208,14 @@ class ParallelSoftStep {
             const SoftStepOutput& output) {
     using namespace soft_step_detail;
     const SoftStepView view = view_of(input, options, output);
+    if (input.joints.tasks > 0) {
+      executor.for_each(nullptr, input.body_count, [=] TANDEM_HD(std::uint32_t i) {
+        weigh_joined(view.input.joints, view.input.bodies, i, view.groups.colouring.numbers->most_mass);
+      });
+    }
     executor.for_each(nullptr, input.body_count, [=] TANDEM_HD(std::uint32_t i) { fill_body(view, i); });
+    executor.for_each(nullptr, input.joints.place_count(),
+                      [=] TANDEM_HD(std::uint32_t i) { begin_placed(view.joints(), view.unit_root(), i); });
     executor.for_each(view.sweeps.groups, room_.groups,
                       [=] TANDEM_HD(std::uint32_t i) { begin_group(view, i); });
     executor.for_each(view.groups.lanes, kSoftWidth * room_.groups,
@@ -206,12 +223,10 @@ class ParallelSoftStep {
     view_.emplace(view);
   }
   void sweep(Executor& executor) {
-    const SoftSweeps sweeps = view_->sweeps;
-    executor.together(room_.groups / kGroupsOfTeam,
-                      [=] TANDEM_HD(const Worker& worker) { sweep_all<false>(sweeps, worker); });
-    if constexpr (Executor::kHasManyWorkers)
-      executor.together(room_.groups / kGroupsOfTeam,
-                        [=] TANDEM_HD(const Worker& worker) { sweep_all<true>(sweeps, worker); });
+    if (view_->input.joints.tasks > 0)
+      sweep(executor, view_->joints(), std::max(view_->input.joints.tasks, room_.groups / kGroupsOfTeam));
+    else
+      sweep(executor, NoJoints{}, room_.groups / kGroupsOfTeam);
   }
   void write(Executor& executor) {
     using namespace soft_step_detail;
@@ -219,6 +234,25 @@ class ParallelSoftStep {
     executor.for_each(nullptr, view.input.body_count, [=] TANDEM_HD(std::uint32_t i) { end_body(view, i); });
     executor.for_each(view.groups.lanes, kSoftWidth * room_.groups,
                       [=] TANDEM_HD(std::uint32_t i) { end_lane(view, i); });
+    executor.for_each(nullptr, view.input.joints.count, [=] TANDEM_HD(std::uint32_t i) {
+      if (view.groups.needs->has_room != 0)
+        end_joint(view.input.joints, view.output.states, view.input.dt, i);
+    });
+    executor.for_each(nullptr, view.input.joints.place_count(), [=] TANDEM_HD(std::uint32_t i) {
+      if (view.groups.needs->has_room != 0)
+        end_placed(view.joints(), view.unit_root(), view.output.states, i);
+    });
+  }
+
+  // Joints: NoJoints or JointSweeps.
+  template <typename Joints>
+  void sweep(Executor& executor, const Joints& joints, std::uint32_t most_teams) {
+    const SoftSweeps sweeps = view_->sweeps;
+    executor.together(most_teams,
+                      [=] TANDEM_HD(const Worker& worker) { sweep_all<false>(sweeps, joints, worker); });
+    if constexpr (Executor::kHasManyWorkers)
+      executor.together(most_teams,
+                        [=] TANDEM_HD(const Worker& worker) { sweep_all<true>(sweeps, joints, worker); });
   }
 
  private:

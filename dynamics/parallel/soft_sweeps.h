@@ -32,6 +32,11 @@ struct SoftTurns {
   BodyTurn turn[2][kSoftWidth];
 };
 
+/// Stands for JointSweeps in a step without joints.
+struct NoJoints {
+  static constexpr bool kAny = false;
+};
+
 /// A sweep over all pairs.
 struct Sweep {
   enum class Kind : std::uint8_t { start, push, follow, relax, rub, rebound };
@@ -76,13 +81,20 @@ namespace soft_sweeps_detail {
 struct Side {
   std::uint32_t body;
   std::uint32_t turn;
-  bool moves, is_last;
+  bool moves, is_last;  ///< is_last: the pair does the body's work
 };
 
-TANDEM_HD inline Side side_of(const SoftTurns& turns, int side, int lane, std::uint32_t sweep) {
+template <typename Joints>
+TANDEM_HD Side side_of(const SoftSweeps& all, const Joints& joints, const SoftTurns& turns, int side,
+                       int lane, std::uint32_t sweep) {
   const std::uint32_t body = turns.body[side][lane];
   const BodyTurn turn = turns.turn[side][lane];
-  return {body, sweep * turn.turns + turn.turn, body != kNoIndex, turn.turn + 1 == turn.turns};
+  Side out = {body, sweep * turn.turns + turn.turn, body != kNoIndex, turn.turn + 1 == turn.turns};
+  if constexpr (Joints::kAny) {
+    if (!out.moves || !joints.hold(body)) return out;
+    out.turn += joints.turns_before(body, sweep, all.substeps), out.is_last = false;
+  }
+  return out;
 }
 
 TANDEM_HD inline void give_turn(SharedMotion& to, std::uint32_t turn, const SoftMotion& motion) {
@@ -184,12 +196,13 @@ TANDEM_HD void visit(const SoftSweeps& all, const Sweep& sweep, PairVisit<OneLan
   }
 }
 
-template <bool kMany>
-TANDEM_HD void visit_lane(const SoftSweeps& all, std::uint32_t number, const Sweep& sweep,
-                          const Meetings& meetings, std::uint32_t group, int lane) {
+template <bool kMany, typename Joints>
+TANDEM_HD void visit_lane(const SoftSweeps& all, const Joints& joints, std::uint32_t number,
+                          const Sweep& sweep, const Meetings& meetings, std::uint32_t group, int lane) {
   if (static_cast<std::uint32_t>(lane) >= all.rows.pairs[group].pairs) return;
   const SoftTurns& turns = all.turns[group];
-  const Side sides[2] = {side_of(turns, 0, lane, number), side_of(turns, 1, lane, number)};
+  const Side sides[2] = {side_of(all, joints, turns, 0, lane, number),
+                         side_of(all, joints, turns, 1, lane, number)};
   PairVisit<OneLane, kMany> pair(all.rows, group, lane);
   MotionOf<OneLane> moved[2] = {};
   visit(all, sweep, pair, moved, [&] {
@@ -225,24 +238,30 @@ TANDEM_HD inline std::uint32_t end_of_colour(const SoftSweeps& all, std::uint32_
 /// those with a colour of their own. On its way to a meeting a worker reads rows of the next colour.
 ///
 /// kMany: on a GPU, what is for few tasks leaves many alone, and the other way round. Workers of the CPU
-/// never meet.
-template <bool kMany>
-TANDEM_HD void sweep_all(const SoftSweeps& all, const Worker& worker) {
+/// never meet. joints: NoJoints or JointSweeps.
+template <bool kMany, typename Joints>
+TANDEM_HD void sweep_all(const SoftSweeps& all, const Joints& joints, const Worker& worker) {
   constexpr std::uint32_t kLanes = kGroupsOfTeam * kSoftWidth, kMostTasksWithoutMeeting = 600;
   const std::uint32_t tasks = *all.groups / kGroupsOfTeam;
-  if (kCanMeet && (tasks > kMostTasksWithoutMeeting) != kMany) return;
-  if (worker.team >= tasks && !kMany) return;
+  std::uint32_t most = tasks;
+  if constexpr (Joints::kAny) {
+    if (!joints.are_solved()) return;
+    most = std::max(tasks, joints.tasks());
+  }
+  if (kCanMeet && (most > kMostTasksWithoutMeeting) != kMany) return;
+  if (worker.team >= most && !kMany) return;
   Meetings meetings(all.arrived);
   const std::uint32_t sweeps = all.sweeps();
   for (std::uint32_t number = 0; number < sweeps; ++number) {
     const Sweep sweep = sweep_of(number, all.substeps);
+    if constexpr (Joints::kAny) joints.template visit_before<kMany>(all, number, sweep, meetings, worker);
     std::uint32_t begin = 0;
     for (std::uint32_t colour = 0; begin < tasks; ++colour) {
       const std::uint32_t end = kMany ? soft_sweeps_detail::end_of_colour(all, colour) : tasks;
       if (begin == end) continue;
       for (std::uint32_t task = begin + worker.team; task < end; task += worker.teams) {
         for (std::uint32_t lane = worker.lane; lane < kLanes; lane += worker.lanes)
-          soft_sweeps_detail::visit_lane<kMany>(all, number, sweep, meetings,
+          soft_sweeps_detail::visit_lane<kMany>(all, joints, number, sweep, meetings,
                                                 kGroupsOfTeam * task + lane / kSoftWidth,
                                                 static_cast<int>(lane % kSoftWidth));
       }

@@ -4,6 +4,7 @@
 
 #include "dynamics/pair_ahead.h"
 #include "dynamics/parallel/contact_pair.h"
+#include "dynamics/parallel/joint_arrays.h"
 #include "dynamics/remembered_contacts.h"
 #include "dynamics/rigid_body.h"
 #include "dynamics/step_solver.h"
@@ -43,6 +44,7 @@ struct StepCounts {
   std::uint32_t records_before, pairs;
   std::uint32_t middle, asked, apart, approaches, surprised, missed;  ///< pairs, but for approaches
   std::uint32_t found, remembered, touching;  ///< contacts found, room for those remembered, pairs that push
+  std::uint32_t broken;                       ///< joints that break at the end of the step
   std::uint32_t bad_body;                     ///< the first whose state is not usable, or kNoIndex
   LargestReach reach;
 };
@@ -97,6 +99,8 @@ struct StepArrays {
   std::uint32_t* place;  ///< of each contact among those that the pair remembers
   std::uint8_t* contact_marks;
   ContactImpulse *impulses_before, *impulses, *done;
+
+  JointArrays joints;
 
   StepCounts* counts;
   double dt;

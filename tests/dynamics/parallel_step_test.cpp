@@ -2,72 +2,13 @@
 
 #include <gtest/gtest.h>
 
-#include <cstring>
-
+#include "dynamics/both_ways.h"
 #include "dynamics/falling_bodies.h"
-#include "dynamics/host_questions.h"
-#include "dynamics/world_setup.h"
 
 namespace tandem::test {
 namespace {
 
 using namespace dynamics;
-
-bool same_bytes(const BodyState& p, const BodyState& q) {
-  return std::memcmp(&p, &q, sizeof p) == 0;
-}
-
-// Moves the same bodies by a Simulation and by a parallel simulation on threads of the CPU.
-class BothWays {
- public:
-  explicit BothWays(const FallingBodies& of, const WorldOptions& options = {}, std::uint32_t threads = 1)
-      : threads_(threads),
-        executor_(threads_),
-        questions_(of.assets.views()),
-        parallel(executor_, questions_) {
-    WorldSetup setup;
-    std::uint64_t where = 0;
-    EXPECT_EQ(set_up(of.assets.views(), of.descriptions, options, {}, setup, where), Status::kOk);
-    setup.options.solver.kind = SolverKind::soft;
-    const std::vector<double> inner = inner_radii(of.assets.views());
-    std::vector<AssetBox> boxes;
-    for (const AssetView& view : of.assets.views())
-      boxes.push_back(asset_box(view.header->lower, view.header->upper, view.header->origin));
-    EXPECT_EQ(parallel.set_bodies({setup.properties, setup.states, inner, boxes},
-                                  {setup.options.gravity, setup.options.solver, setup.options.sleep}),
-              Status::kOk);
-    SimulationParts parts;
-    parts.contacts = make_scene_contacts(of.assets.views(), 1);
-    parts.ahead = std::make_unique<ContactsAhead>(of.assets.views(), 1);
-    simulation = std::make_unique<Simulation>(std::move(setup.properties), std::move(setup.states),
-                                              std::move(parts), setup.options);
-  }
-
-  // Makes a step both ways, and compares. Result: whether all is the same.
-  void step(int number) {
-    simulation->step();
-    ASSERT_EQ(parallel.step(1.0 / 60), Status::kOk) << number;
-    for (std::uint32_t i = 0; i < parallel.bodies(); ++i) {
-      ASSERT_TRUE(same_bytes(states()[i], simulation->states()[i])) << "step " << number << " body " << i;
-      ASSERT_EQ(parallel.arrays().group[i] != Sleep::kAwake, simulation->sleeps(i)) << number << " " << i;
-    }
-    const StepCounts& counts = parallel.counts();
-    middle += counts.middle, ahead += counts.approaches, missed += counts.missed;
-    touching += counts.touching;
-  }
-
-  std::span<const BodyState> states() const { return {parallel.arrays().start, parallel.bodies()}; }
-
- private:
-  Threads threads_;
-  HostExecutor executor_;
-  HostQuestions questions_;
-
- public:
-  std::unique_ptr<Simulation> simulation;
-  ParallelSimulation<HostExecutor, HostQuestions> parallel;
-  std::uint32_t middle = 0, ahead = 0, missed = 0, touching = 0;
-};
 
 TEST(ParallelStep, IsTheStepOfASimulation) {
   const FallingBodies bodies(24);

@@ -1,0 +1,218 @@
+#include <gtest/gtest.h>
+
+#include "dynamics/both_ways.h"
+#include "dynamics/falling_bodies.h"
+
+namespace tandem::test {
+namespace {
+
+using namespace dynamics;
+
+// A floor, and boxes of 40 x 30 x 20 cm.
+struct JoinedBoxes : FallingBodies {
+  JoinedBoxes() : FallingBodies(1) {}
+
+  std::uint32_t add(double x, double y, double z) {
+    BodyDescription& body = descriptions.emplace_back();
+    body.asset = 3, body.pose = shift(x, y, z);
+    return static_cast<std::uint32_t>(descriptions.size() - 1);
+  }
+  JointDescription& join(JointKind kind, std::uint32_t a, std::uint32_t b, const double (&anchor)[3]) {
+    JointDescription& joint = joints.emplace_back();
+    joint.kind = kind, joint.a = a, joint.b = b;
+    std::ranges::copy(anchor, joint.anchor), std::ranges::copy(anchor, joint.anchor_b);
+    return joint;
+  }
+  BothWays begin(const WorldOptions& options = {}, std::uint32_t threads = 1) const {
+    return BothWays(*this, options, threads, joints);
+  }
+
+  std::vector<JointDescription> joints;
+};
+
+void steps(BothWays& both, int count) {
+  for (int step = 0; step < count && !testing::Test::HasFatalFailure(); ++step) both.step(step);
+}
+
+// Pairs of boxes that fall in a heap, of any kind of joint, some with limits, motors and bounds that break.
+JoinedBoxes heap_of_pairs() {
+  JoinedBoxes heap;
+  for (int i = 0; i < 15; ++i) {
+    const double x = 0.5 * (i % 3), z = 0.4 + 0.5 * (i / 3), at[3] = {x, 0.17, z};
+    const std::uint32_t a = heap.add(x, 0, z), b = heap.add(x, 0.34, z);
+    JointDescription& joint = heap.join(static_cast<JointKind>(i % 5), a, b, at);
+    if (joint.kind == JointKind::distance) joint.anchor[1] = 0, joint.anchor_b[1] = 0.34, joint.most = 0.4;
+    if (i % 2 == 0 && (joint.kind == JointKind::hinge || joint.kind == JointKind::slider))
+      joint.least = -0.05, joint.most = 0.1;
+    if (i % 3 == 0 && (joint.kind == JointKind::hinge || joint.kind == JointKind::slider))
+      joint.speed = 2, joint.most_effort = 20;
+    if (i % 4 == 0) joint.breaking_force = 4000;
+    joint.may_touch = i % 2 == 1;
+  }
+  return heap;
+}
+
+TEST(ParallelJoints, AreThoseOfASimulationInAHeap) {
+  const JoinedBoxes heap = heap_of_pairs();
+  for (const std::uint32_t threads : {1u, 3u}) {
+    BothWays both = heap.begin({.sleeping = false}, threads);
+    steps(both, 150);
+    EXPECT_GT(both.touching, 1000u);
+    std::size_t held = 0;
+    for (const Joint& joint : both.simulation->joints()) held += joint.holds ? 1 : 0;
+    EXPECT_GT(held, 10u);
+    EXPECT_LT(held, 15u);
+  }
+}
+
+// Nothing touches: joints alone hold these bodies.
+TEST(ParallelJoints, HoldBodiesThatTouchNothing) {
+  for (const JointKind kind :
+       {JointKind::ball, JointKind::hinge, JointKind::slider, JointKind::fixed, JointKind::distance}) {
+    SCOPED_TRACE(static_cast<int>(kind));
+    JoinedBoxes boxes;
+    for (int i = 0; i < 3; ++i) {
+      const std::uint32_t body = boxes.add(0.5 * i, 0, 3);
+      JointDescription& joint = boxes.join(kind, i == 0 ? kNoIndex : body - 1, body, {0.5 * i - 0.2, 0, 3.1});
+      joint.axis[0] = 0.3, joint.axis[1] = 1, joint.axis[2] = 0.4;
+      joint.anchor_b[0] += 0.1;
+      if (kind == JointKind::slider) joint.least = -0.1, joint.most = 0.1;
+    }
+    BothWays both = boxes.begin({.sleeping = false});
+    steps(both, 60);
+    EXPECT_EQ(both.touching, 0u);
+    const double fallen = 3 - both.states()[3].position.z;
+    EXPECT_EQ(fallen > 0.02, kind != JointKind::fixed) << fallen;
+    EXPECT_LT(fallen, 2);
+  }
+}
+
+TEST(ParallelJoints, MakeAChainThatFallsOnTheFloor) {
+  JoinedBoxes chain;
+  for (int i = 0; i < 20; ++i) {
+    const std::uint32_t link = chain.add(0.42 * i, 0, 1.5);
+    if (i > 0) chain.join(JointKind::ball, link - 1, link, {0.42 * i - 0.21, 0, 1.5});
+  }
+  chain.join(JointKind::ball, kNoIndex, 1, {-0.2, 0, 1.5});
+  BothWays both = chain.begin({.sleeping = false}, 2);
+  steps(both, 120);
+  EXPECT_GT(both.touching, 100u);
+}
+
+// A body that kinematic ones carry, and a bar that a motor turns between limits.
+TEST(ParallelJoints, ActOnKinematicBodiesAndByMotors) {
+  JoinedBoxes boxes;
+  const std::uint32_t carrier = boxes.add(0, 0, 2), load = boxes.add(0, 0, 1.7), bar = boxes.add(2, 0, 1);
+  boxes.descriptions[carrier].filter.motion = Motion::kinematic;
+  boxes.descriptions[carrier].velocity[0] = 0.5, boxes.descriptions[carrier].angular_velocity[2] = 1;
+  boxes.join(JointKind::hinge, carrier, load, {0, 0, 1.85}).axis[0] = 1;
+  JointDescription& motor = boxes.join(JointKind::hinge, kNoIndex, bar, {2, 0, 1});
+  motor.speed = 3, motor.most_effort = 100, motor.least = -0.5, motor.most = 0.8;
+  BothWays both = boxes.begin();
+  steps(both, 60);
+  EXPECT_NEAR(both.simulation->joint_memory()[1].position, 0.8, 0.01);
+  both.set_motor(1, -2, 80);
+  steps(both, 60);
+  EXPECT_NEAR(both.simulation->joint_memory()[1].position, -0.5, 0.01);
+}
+
+TEST(ParallelJoints, BreakAndLetTheirBodiesTouch) {
+  JoinedBoxes boxes;
+  const std::uint32_t upper = boxes.add(0, 0, 0.30), lower = boxes.add(0, 0, 0.1);
+  JointDescription& joint = boxes.join(JointKind::fixed, lower, upper, {0, 0, 0.2});
+  joint.breaking_force = 100;
+  BothWays both = boxes.begin();
+  EXPECT_FALSE(both.simulation->joints()[0].may_touch);
+  std::size_t broken = 0;
+  for (int step = 0; step < 60 && !HasFatalFailure(); ++step) {
+    both.step(step);
+    broken += both.parallel.broken().size();
+  }
+  EXPECT_EQ(broken, 1u);
+  EXPECT_GT(both.states()[upper].position.z, 0.25);  // it lies on the lower one
+}
+
+TEST(ParallelJoints, SleepAndWakeTogether) {
+  JoinedBoxes boxes;
+  const std::uint32_t a = boxes.add(0, 0, 0.1), b = boxes.add(0.5, 0, 0.1), c = boxes.add(1, 0, 0.1);
+  const std::uint32_t hook = boxes.add(3, 0, 3), hung = boxes.add(3, 0, 2.7), far = boxes.add(-3, 0, 0.1);
+  boxes.descriptions[hook].filter.motion = Motion::fixed;
+  boxes.join(JointKind::ball, a, b, {0.25, 0, 0.1}), boxes.join(JointKind::hinge, b, c, {0.75, 0, 0.1});
+  boxes.join(JointKind::ball, hook, hung, {3, 0, 2.85});
+  const std::uint32_t turned = boxes.add(-3, 2, 2);
+  JointDescription& motor = boxes.join(JointKind::hinge, kNoIndex, turned, {-3, 2, 2});
+  motor.most_effort = 10;
+  BothWays both = boxes.begin();
+  steps(both, 60);
+  ASSERT_EQ(both.sleeping(), 6u);
+  // A motor keeps its body awake, and no other.
+  both.set_motor(3, 1e-4, 10);
+  steps(both, 60);
+  ASSERT_EQ(both.sleeping(), 5u);
+  // A body that is placed wakes what it is joined to; what is placed and fixed too.
+  BodyState state = both.states()[c];
+  state.velocity.x = 1;
+  both.place(c, state);
+  ASSERT_EQ(both.sleeping(), 2u);
+  state = both.states()[hook];
+  state.position.x += 0.1;
+  both.place(hook, state);
+  ASSERT_EQ(both.sleeping(), 1u);
+  steps(both, 150);
+  // A joint that is added wakes its bodies, and so does one that is removed.
+  both.remove_joint(1);
+  JointDescription rod;
+  rod.kind = JointKind::distance, rod.a = far, rod.b = a;
+  const Vector3 from = both.states()[far].position, to = both.states()[a].position;
+  rod.anchor[0] = from.x, rod.anchor[1] = from.y, rod.anchor[2] = from.z;
+  rod.anchor_b[0] = to.x, rod.anchor_b[1] = to.y, rod.anchor_b[2] = to.z;
+  EXPECT_EQ(both.add_joint(rod), 1u);
+  EXPECT_FALSE(both.simulation->sleeps(far));
+  EXPECT_EQ(both.add_joint({.kind = JointKind::ball, .b = far}), 4u);
+  steps(both, 120);
+}
+
+// An awake body wakes what joints hang on it, by and by.
+TEST(ParallelJoints, WakeABodyThatIsJoinedToOneAwake) {
+  JoinedBoxes boxes;
+  const std::uint32_t a = boxes.add(0, 0, 0.1), b = boxes.add(0.5, 0, 0.1);
+  const std::uint32_t mover = boxes.add(2, 0, 2);
+  boxes.descriptions[mover].filter.motion = Motion::kinematic;
+  BothWays both = boxes.begin();
+  steps(both, 60);
+  ASSERT_EQ(both.sleeping(), 2u);
+  both.add_joint({.kind = JointKind::ball, .a = a, .b = b, .anchor = {0.25, 0, 0.1}});
+  both.add_joint({.kind = JointKind::ball, .a = mover, .b = b, .anchor = {0.7, 0, 0.2}});
+  steps(both, 120);
+  EXPECT_EQ(both.sleeping(), 0u);
+}
+
+TEST(ParallelJoints, KeepJoinedBodiesFromTouchingUnlessTheyMay) {
+  for (const bool may_touch : {false, true}) {
+    JoinedBoxes boxes;
+    const std::uint32_t a = boxes.add(0, 0, 0.1), b = boxes.add(0.05, 0.02, 0.31);
+    boxes.join(JointKind::distance, a, b, {0, 0, 0.1}).may_touch = may_touch;
+    boxes.joints[0].anchor_b[2] = 0.31, boxes.joints[0].least = 0, boxes.joints[0].most = 1;
+    BothWays both = boxes.begin();
+    steps(both, 60);
+    EXPECT_EQ(both.states()[b].position.z > 0.25, may_touch);
+    // What was remembered of a pair goes where a joint keeps it from touching.
+    if (may_touch) both.add_joint({.kind = JointKind::ball, .a = b, .b = a, .anchor = {0, 0, 0.3}});
+    steps(both, 60);
+  }
+}
+
+// More joints at one body than there are shared colours, and places that several teams take.
+TEST(ParallelJoints, MayBeManyAtABody) {
+  JoinedBoxes star;
+  const std::uint32_t hub = star.add(0, 0, 3);
+  for (int i = 0; i < 150; ++i) {
+    const std::uint32_t tip = star.add(2 * std::cos(i * 0.5), 2 * std::sin(i * 0.5), 3 + 0.3 * i);
+    star.join(JointKind::ball, hub, tip, {0, 0, 3});
+  }
+  BothWays both = star.begin({.sleeping = false}, 3);
+  steps(both, 3);
+}
+
+}  // namespace
+}  // namespace tandem::test

@@ -31,6 +31,12 @@ struct BodyProperties : BodySettings {
   Matrix3 inverse_inertia = Matrix3::identity();
 };
 
+/// Returns whether anybody wants to know of contacts between two bodies: of those of fixed ones, which there may
+/// be where one was placed, nobody does.
+TANDEM_HD inline bool are_told(const BodyProperties& a, const BodyProperties& b) {
+  return a.motion != Motion::fixed || b.motion != Motion::fixed;
+}
+
 /// The state of a body: where it is and how it moves, in the world.
 struct BodyState {
   Vector3 position;  ///< of the centre of mass

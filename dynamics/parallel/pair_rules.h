@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <span>
 
+#include "dynamics/pair_touch.h"
 #include "dynamics/parallel/atomics.h"
 #include "dynamics/parallel/pair_lists.h"
 #include "dynamics/parallel/step_arrays.h"
@@ -29,6 +30,12 @@ TANDEM_HD inline std::uint32_t records_before(const StepArrays& a, const ObjectP
 TANDEM_HD inline bool is_near(const StepArrays& a, const ObjectPair& pair) {
   const std::uint32_t i = near_before(a, pair);
   return i < near_count(a) && is_same(a.near[i], pair);
+}
+
+// Returns whether a pair has to be followed though it is not near: for its contacts, or what it did in a
+// call.
+TANDEM_HD inline bool is_followed(const PairRecord& record) {
+  return record.count > 0 || record.touches || record.began || record.ended;
 }
 
 TANDEM_HD inline std::uint32_t least_of(std::uint32_t a, std::uint32_t b) {
@@ -62,7 +69,8 @@ TANDEM_HD inline void plan_pair(const StepArrays& a, std::uint32_t at, const Obj
   const PairRecord* const old = before != kNoIndex ? &a.records_before[before] : nullptr;
   PairRecord& record = a.records[at];
   PairPlan& plan = a.plans[at];
-  record.pair = pair, record.is_near = is_near, record.touches = false;
+  record.pair = pair, record.is_near = is_near;
+  record.touches = record.began = record.ended = false;
   record.apart = 0;
   if (is_near && old != nullptr && old->is_near)
     record.apart = old->apart - way_between(a.ways[pair.a], a.ways[pair.b]) * (1 + 1e-9);
@@ -96,9 +104,7 @@ TANDEM_HD inline void decide_pair(const StepArrays& a, std::uint32_t at) {
     record.posed[0] = plan.keeps ? old->posed[0] : now[0];
     record.posed[1] = plan.keeps ? old->posed[1] : now[1];
   }
-  // Nobody wants to know of a fixed body that was placed and another that does not move.
-  const bool counts = !plan.is_idle && (a.properties[pair.a].motion == Motion::moving ||
-                                        a.properties[pair.b].motion == Motion::moving);
+  const bool counts = !plan.is_idle && are_told(a.properties[pair.a], a.properties[pair.b]);
   plan.is_asked = counts && !plan.keeps && (is_remembered || (plan.is_fast && !plan.is_of_middle));
 }
 
@@ -106,6 +112,12 @@ TANDEM_HD inline bool is_asked_how_far(const StepArrays& a, std::uint32_t at) {
   const PairRecord& record = a.records[at];
   const PairPlan& plan = a.plans[at];
   return record.is_near && plan.found == 0 && !plan.keeps && !(record.apart > plan.reach);
+}
+
+// Returns whether the solver takes the contacts of a pair: those of bodies that it does not move stay as they
+// were.
+TANDEM_HD inline bool is_solved(const StepArrays& a, const PairRecord& record) {
+  return record.contacts > 0 && (a.is_moved(record.pair.a) || a.is_moved(record.pair.b));
 }
 
 // Makes the contacts of a pair, behind those of the pairs before it.
@@ -133,6 +145,11 @@ TANDEM_HD inline void remember_pair(const StepArrays& a, std::uint32_t at) {
   record.count = made.remembered, record.contacts = made.contacts;
   for (std::uint32_t i = 0; i < made.contacts; ++i)
     a.impulses_before[record.first + i] = to.remembered[to.place[i]].impulse;
+  if (is_solved(a, record)) return;
+  for (std::uint32_t i = 0; i < made.contacts; ++i) {
+    a.impulses[record.first + i] = a.impulses_before[record.first + i];
+    a.done[record.first + i] = {};
+  }
 }
 
 // Returns what was found of a row of a question; nothing where there is no room for all that was found.
@@ -212,16 +229,32 @@ TANDEM_HD inline bool is_surprised(const StepArrays& a, std::uint32_t at) {
          std::max(0.0, record.apart) + a.options.slop;
 }
 
-// A pair touches if at the step's start it has a contact that is no gap, or if one pushes.
-TANDEM_HD inline void finish_pair(const StepArrays& a, std::uint32_t at) {
+// Follows whether a pair touches, as Touches does, and what it began and ended in a call. touch: of the
+// contacts of the step, of which two idle bodies have none.
+TANDEM_HD inline void follow_touch(const StepArrays& a, std::uint32_t at, const PairTouch& touch) {
   PairRecord& record = a.records[at];
   const PairPlan& plan = a.plans[at];
-  if (plan.is_idle && plan.before != kNoIndex) record.touches = a.records_before[plan.before].touches;
+  const PairRecord* const before = plan.before != kNoIndex ? &a.records_before[plan.before] : nullptr;
+  const bool touched = before != nullptr && before->touches, had_begun = before != nullptr && before->began;
+  record.touches = touch.touches() || (plan.is_idle && touched);
+  record.began = had_begun || (record.touches && !touched);
+  record.ended = (before != nullptr && before->ended) || (touched && !record.touches);
+  if (record.touches) a.touches[at] = touch.touches() ? touch.touch() : a.touches_before[plan.before];
+  if (!record.began) return;
+  a.begun[at] = had_begun ? a.begun_before[plan.before] : a.touches[at];
+  if (record.touches) take_hardest(a.begun[at], a.touches[at]);
+}
+
+// Takes what the contacts of a pair did.
+TANDEM_HD inline void finish_pair(const StepArrays& a, std::uint32_t at) {
+  const PairRecord& record = a.records[at];
+  PairTouch touch(record.pair);
   for (std::uint32_t i = 0; i < record.contacts; ++i) {
     const std::uint32_t k = record.first_contact + i;
     remember(a.remembered[record.first + a.place[k]], a.impulses[k]);
-    record.touches = record.touches || a.contacts[k].depth >= 0 || a.done[k].normal > 0;
+    touch.add(a.contacts[k], a.done[k].normal, approach_of(a.contacts[k], {a.start, a.bodies}));
   }
+  follow_touch(a, at, touch);
 }
 
 }  // namespace pair_step_detail

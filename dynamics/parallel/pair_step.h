@@ -88,7 +88,7 @@ struct PairStep {
     const StepArrays of = a;
     to.for_each(&of.counts->records_before, a.most_pairs, [of] TANDEM_HD(std::uint32_t j) {
       const PairRecord& old = of.records_before[j];
-      of.flags[j] = old.count > 0 && !is_near(of, old.pair) ? 1 : 0;
+      of.flags[j] = is_followed(old) && !is_near(of, old.pair) ? 1 : 0;
     });
     to.sum_before(a.flags, &of.counts->records_before, a.most_pairs, a.sums);
     to.once([of] TANDEM_HD() { of.counts->pairs = near_count(of) + of.sums[of.counts->records_before]; });
@@ -202,13 +202,9 @@ struct PairStep {
   }
 
   void list_touching() {
+    using namespace pair_step_detail;
     const StepArrays of = a;
-    select(
-        [of] TANDEM_HD(std::uint32_t i) {
-          const PairRecord& record = of.records[i];
-          return record.contacts > 0 && (of.is_moved(record.pair.a) || of.is_moved(record.pair.b));
-        },
-        &of.counts->touching);
+    select([of] TANDEM_HD(std::uint32_t i) { return is_solved(of, of.records[i]); }, &of.counts->touching);
     to.for_each(&of.counts->touching, a.most_pairs, [of] TANDEM_HD(std::uint32_t r) {
       const PairRecord& record = of.records[of.list[r]];
       of.touching[r] = {record.pair.a, record.pair.b, record.first_contact, record.contacts};

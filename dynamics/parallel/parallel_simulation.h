@@ -8,6 +8,7 @@
 #include "dynamics/parallel/pair_step.h"
 #include "dynamics/parallel/sleep_step.h"
 #include "dynamics/parallel/soft_step.h"
+#include "dynamics/parallel/touch_lists.h"
 
 namespace tandem::dynamics {
 
@@ -105,6 +106,23 @@ class ParallelSimulation {
     return to_.copy(std::span<const BodyForce>(&force, 1), forces_.data() + body);
   }
 
+  /// Lets began() and ended() begin anew.
+  void forget_call() {
+    const StepArrays a = arrays();
+    to_.for_each(&a.counts->records_before, a.most_pairs, ForgetCall{a.records_before});
+  }
+
+  /// Copy what World's functions of these names return: began and ended since forget_call().
+  Status touching(std::vector<WorldTouch>& pairs) {
+    return list(&PairRecord::touches, touches_[0].data(), listed_touches_, pairs);
+  }
+  Status began(std::vector<WorldTouch>& pairs) {
+    return list(&PairRecord::began, begun_[0].data(), listed_touches_, pairs);
+  }
+  Status ended(std::vector<ObjectPair>& pairs) {
+    return list(&PairRecord::ended, records_[0].data(), listed_pairs_, pairs);
+  }
+
   std::uint32_t bodies() const { return bodies_; }
   std::uint32_t bad_body() const { return read_.bad_body; }
   const StepCounts& counts() const { return read_; }  ///< of the last step
@@ -123,6 +141,8 @@ class ParallelSimulation {
     a.inner_radius = inner_radius_.data(), a.boxes = boxes_.data();
     a.most_pairs = most_pairs_;
     a.records_before = records_[0].data(), a.records = records_[1].data();
+    a.touches_before = touches_[0].data(), a.touches = touches_[1].data();
+    a.begun_before = begun_[0].data(), a.begun = begun_[1].data();
     a.plans = plans_.data(), a.flags = flags_.data(), a.sums = sums_.data(), a.list = list_.data();
     a.asked = asked_.data(), a.reach = reach_.data();
     a.row_first = row_first_.data(), a.row_end = row_end_.data();
@@ -227,10 +247,28 @@ class ParallelSimulation {
   Status go_on() {
     constexpr double kWide = 3;
     std::swap(records_[0], records_[1]), std::swap(remembered_[0], remembered_[1]);
+    std::swap(touches_[0], touches_[1]), std::swap(begun_[0], begun_[1]);
     parity_ = 1 - parity_;
     const double needed = read_.reach.farthest(0.5 * options_.solver.slop);
     if (kWide * needed < within_) within_ = 1.5 * needed, ++generation_;
     return to_.status();
+  }
+
+  // Copies the rows of the records that have a flag. There are none before a step, whose counts are 0.
+  template <typename From, typename Row>
+  Status list(bool PairRecord::*flag, const From* from, Array<Row>& listed, std::vector<Row>& out) {
+    const StepArrays a = arrays();
+    std::uint32_t* const count = &a.counts->listed;
+    std::uint32_t found = 0;
+    to_.select(RecordIsListed{a.records_before, flag}, &a.counts->records_before, a.most_pairs, a.list, count);
+    Status status = to_.copy(count, std::span(&found, 1));
+    out.clear();
+    if (status != Status::kOk || found == 0) return status;
+    status = listed.reserve(found);
+    if (status != Status::kOk) return status;
+    to_.for_each(count, found, CopyListed<From, Row>{from, a.list, listed.data()});
+    out.resize(found);
+    return to_.copy(listed.data(), std::span(out));
   }
 
   template <typename T>
@@ -270,7 +308,9 @@ class ParallelSimulation {
     const std::uint32_t kept = most_pairs_;
     Status out = Status::kOk;
     for (Status status :
-         {records_[0].grow(pairs, kept), records_[1].grow(pairs, kept), plans_.reserve(pairs),
+         {records_[0].grow(pairs, kept), records_[1].grow(pairs, kept), touches_[0].grow(pairs, kept),
+          touches_[1].grow(pairs, kept), begun_[0].grow(pairs, kept), begun_[1].grow(pairs, kept),
+          plans_.reserve(pairs),
           flags_.reserve(pairs + 1), sums_.reserve(pairs + 1), list_.reserve(pairs), asked_.reserve(pairs),
           reach_.reserve(pairs), row_first_.reserve(pairs), row_end_.reserve(pairs), touching_.reserve(pairs),
           to_.reserve(pairs + 1), ask_.reserve(bodies_, pairs)}) {
@@ -339,6 +379,7 @@ class ParallelSimulation {
   Array<double> quiet_, inner_radius_;
   Array<AssetBox> boxes_;
   Array<PairRecord> records_[2];
+  Array<WorldTouch> touches_[2], begun_[2];
   Array<PairPlan> plans_;
   Array<std::uint32_t> flags_, sums_, list_, row_first_, row_end_;
   Array<ObjectPair> asked_, moved_pairs_;
@@ -353,6 +394,9 @@ class ParallelSimulation {
   Array<std::uint8_t> contact_marks_;
   Array<ContactImpulse> impulses_before_, impulses_, done_;
   Array<StepCounts> counts_;
+
+  Array<WorldTouch> listed_touches_;
+  Array<ObjectPair> listed_pairs_;
 };
 
 }  // namespace tandem::dynamics

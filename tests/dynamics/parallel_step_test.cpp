@@ -6,6 +6,7 @@
 
 #include "dynamics/falling_bodies.h"
 #include "dynamics/host_questions.h"
+#include "dynamics/lists_of_steps.h"
 #include "dynamics/world_setup.h"
 
 namespace tandem::test {
@@ -15,6 +16,11 @@ using namespace dynamics;
 
 bool same_bytes(const BodyState& p, const BodyState& q) {
   return std::memcmp(&p, &q, sizeof p) == 0;
+}
+
+template <typename Row>
+bool same_rows(std::span<const Row> p, std::span<const Row> q) {
+  return p.size() == q.size() && (p.empty() || std::memcmp(p.data(), q.data(), p.size_bytes()) == 0);
 }
 
 // Moves the same bodies by a Simulation and by a parallel simulation on threads of the CPU.
@@ -43,7 +49,13 @@ class BothWays {
                                               std::move(parts), setup.options);
   }
 
-  // Makes a step both ways, and compares. Result: whether all is the same.
+  // A call of World::step() begins.
+  void begin_call() {
+    parallel.forget_call();
+    began.clear(), ended.clear();
+  }
+
+  // Makes a step both ways, and compares.
   void step(int number) {
     simulation->step();
     ASSERT_EQ(parallel.step(1.0 / 60), Status::kOk) << number;
@@ -51,9 +63,24 @@ class BothWays {
       ASSERT_TRUE(same_bytes(states()[i], simulation->states()[i])) << "step " << number << " body " << i;
       ASSERT_EQ(parallel.arrays().group[i] != Sleep::kAwake, simulation->sleeps(i)) << number << " " << i;
     }
+    const Touches& touches = simulation->touches();
+    add_touches(touches.began(), touches.touching(), began);
+    add_pairs(touches.ended(), ended);
+    compare_touches(number);
     const StepCounts& counts = parallel.counts();
     middle += counts.middle, ahead += counts.approaches, missed += counts.missed;
     touching += counts.touching;
+  }
+
+  void compare_touches(int number) {
+    std::vector<WorldTouch> rows;
+    std::vector<ObjectPair> pairs;
+    ASSERT_EQ(parallel.touching(rows), Status::kOk);
+    ASSERT_TRUE(same_rows<WorldTouch>(rows, simulation->touches().touching())) << number;
+    ASSERT_EQ(parallel.began(rows), Status::kOk);
+    ASSERT_TRUE(same_rows<WorldTouch>(rows, began)) << number << " " << rows.size() << " " << began.size();
+    ASSERT_EQ(parallel.ended(pairs), Status::kOk);
+    ASSERT_TRUE(same_rows<ObjectPair>(pairs, ended)) << number << " " << pairs.size() << " " << ended.size();
   }
 
   std::span<const BodyState> states() const { return {parallel.arrays().start, parallel.bodies()}; }
@@ -67,12 +94,20 @@ class BothWays {
   std::unique_ptr<Simulation> simulation;
   ParallelSimulation<HostExecutor, HostQuestions> parallel;
   std::uint32_t middle = 0, ahead = 0, missed = 0, touching = 0;
+  std::vector<WorldTouch> began;  // in the call
+  std::vector<ObjectPair> ended;
 };
 
 TEST(ParallelStep, IsTheStepOfASimulation) {
   const FallingBodies bodies(24);
   BothWays both(bodies, {.sleeping = false});
-  for (int step = 0; step < 240 && !HasFatalFailure(); ++step) both.step(step);
+  std::size_t most_bounced = 0;
+  for (int step = 0; step < 240 && !HasFatalFailure(); ++step) {
+    if (step % 40 == 0) both.begin_call();
+    both.step(step);
+    most_bounced = std::max(most_bounced, std::min(both.began.size(), both.ended.size()));
+  }
+  EXPECT_GT(most_bounced, 8u);
   EXPECT_GT(both.middle, 100u);
   EXPECT_GT(both.ahead, 100u);
   EXPECT_GT(both.touching, 1000u);
@@ -87,6 +122,30 @@ TEST(ParallelStep, SleepsAndWakesAsASimulationDoes) {
     for (std::uint32_t i = 0; i < both.parallel.bodies(); ++i) slept += both.simulation->sleeps(i) ? 1 : 0;
   }
   EXPECT_GT(slept, 100u);
+}
+
+// A platform that rises lifts boxes that sleep in the air, and a bar sweeps them off: bodies that contacts do
+// not move meet such as sleep, and pairs part for good within the call.
+TEST(ParallelStep, FollowsPairsThatKinematicBodiesMeet) {
+  FallingBodies many(1);
+  for (int i = 0; i < 10; ++i) {
+    BodyDescription& body = many.descriptions.emplace_back();
+    body.asset = 3, body.pose = shift(0.5 * (i % 5) - 1, 0.5 * (i / 5), 0.1 + (i % 2) * 0.21);
+  }
+  for (const bool rises : {false, true}) {
+    BodyDescription& body = many.descriptions.emplace_back();
+    body.asset = 3, body.filter.motion = Motion::kinematic;
+    body.pose = rises ? shift(0, 0, -1) : shift(-4, 0, 0.1);
+    body.velocity[rises ? 2 : 0] = rises ? 0.5 : 1;
+  }
+  BothWays both(many);
+  std::uint32_t slept = 0;
+  for (int step = 0; step < 400 && !HasFatalFailure(); ++step) {
+    both.step(step);
+    for (std::uint32_t i = 0; i < both.parallel.bodies(); ++i) slept += both.simulation->sleeps(i) ? 1 : 0;
+  }
+  EXPECT_GT(slept, 100u);
+  EXPECT_GT(both.ended.size(), 5u);
 }
 
 // Boxes that stand side by side, a hair apart, and the first is pushed: of what the others do in the step

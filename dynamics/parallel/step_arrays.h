@@ -15,8 +15,8 @@
 // What the visits of a parallel step read and write, in the memory of its executor.
 namespace tandem::dynamics {
 
-/// A pair of bodies that is remembered from step to step: it was near, it has contacts, or it began or ended to
-/// touch in the last call.
+/// A pair of bodies that is remembered from step to step: it was near, it has contacts, or it began or ended
+/// to touch in the last call.
 struct PairRecord {
   ObjectPair pair;
   bool is_near;   ///< it was, in the last step
@@ -25,8 +25,8 @@ struct PairRecord {
   Pose posed[2];
   std::uint32_t first, count;             ///< of the remembered contacts
   std::uint32_t first_contact, contacts;  ///< of the contacts of the step
-  bool touches;       ///< in the last step, as Touches says
-  bool began, ended;  ///< to touch, in a step of the last call
+  bool touches;                           ///< in the last step, as Touches says
+  bool began, ended;                      ///< to touch, in a step of the last call
 };
 
 /// What becomes of a pair in a step.

@@ -3,8 +3,8 @@
 
 #include "dynamics/parallel/step_arrays.h"
 
-/// Which pairs touch after a step, and which began or ended to touch in the last call: lists of records, which
-/// nobody makes unless somebody asks.
+/// Which pairs touch after a step, and which began or ended to touch in the last call: lists of records,
+/// which nobody makes unless somebody asks.
 namespace tandem::dynamics {
 
 /// Returns whether a record is of a list: `is_listed` is one of its flags.

@@ -32,12 +32,12 @@ void wake_all(Executor& to, const StepArrays& a) {
 /// Wakes a body, and what fell asleep with it. One that contacts do not move wakes what touches it; if it is
 /// placed anew, in the next step what it touches then. Condition: marks are free.
 template <typename Executor>
-void wake_body(Executor& to, const StepArrays& a, std::uint32_t body) {
+void wake_body(Executor& to, const StepArrays& a, std::uint32_t body, bool is_placed) {
   using namespace wake_step_detail;
   const StepArrays of = a;
   to.for_each(nullptr, a.bodies, [of] TANDEM_HD(std::uint32_t i) { of.marks[i] = 0; });
-  to.once([of, body] TANDEM_HD() {
-    if (of.properties[body].motion == Motion::fixed) of.placed[body] = 1;
+  to.once([of, body, is_placed] TANDEM_HD() {
+    if (is_placed && of.properties[body].motion == Motion::fixed) of.placed[body] = 1;
     mark_of(of, body) = 1;
   });
   to.for_each(&of.counts->records_before, a.most_pairs, [of, body] TANDEM_HD(std::uint32_t j) {

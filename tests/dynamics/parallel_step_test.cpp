@@ -49,6 +49,13 @@ class BothWays {
                                               std::move(parts), setup.options);
   }
 
+  // Makes so many steps of a call. begin(step): before each.
+  template <typename Begin>
+  void steps(int count, const Begin& begin) {
+    for (int step = 0; step < count && !testing::Test::HasFatalFailure(); ++step)
+      begin(step), this->step(step);
+  }
+
   // A call of World::step() begins.
   void begin_call() {
     parallel.forget_call();
@@ -70,6 +77,19 @@ class BothWays {
     const StepCounts& counts = parallel.counts();
     middle += counts.middle, ahead += counts.approaches, missed += counts.missed;
     touching += counts.touching;
+  }
+
+  void place(std::uint32_t body, const BodyState& state) {
+    simulation->place(body, state);
+    EXPECT_EQ(parallel.place(body, state), Status::kOk);
+  }
+  void change(std::uint32_t body, const BodySettings& settings) {
+    simulation->change(body, settings);
+    EXPECT_EQ(parallel.change(body, settings), Status::kOk);
+  }
+  void set_force(std::uint32_t body, const BodyForce& force) {
+    simulation->set_force(body, force);
+    EXPECT_EQ(parallel.set_force(body, force), Status::kOk);
   }
 
   void compare_touches(int number) {
@@ -148,6 +168,91 @@ TEST(ParallelStep, FollowsPairsThatKinematicBodiesMeet) {
   EXPECT_GT(both.ended.size(), 5u);
 }
 
+// Boxes sleep on a floor and beside each other, and callers change them, one after the other.
+TEST(ParallelStep, IsToldOfChangesAsASimulationIs) {
+  FallingBodies heap(1);
+  for (int i = 0; i < 8; ++i) {
+    BodyDescription& body = heap.descriptions.emplace_back();
+    body.asset = 3, body.pose = shift(1.1 * (i / 2) - 2, 0, 0.1 + 0.2 * (i % 2));
+  }
+  BodyDescription& held = heap.descriptions.emplace_back();
+  held.asset = 3, held.pose = shift(-2, 0, 0.5), held.filter.motion = Motion::fixed;
+  BothWays both(heap);
+  std::uint32_t slept = 0, woke = 0;
+  both.steps(720, [&](int step) {
+    const auto sleeping = [&] {
+      std::uint32_t count = 0;
+      for (std::uint32_t i = 0; i < both.parallel.bodies(); ++i) count += both.simulation->sleeps(i) ? 1 : 0;
+      return count;
+    };
+    if (step % 60 != 59) return;
+    const std::uint32_t before = sleeping(), body = 1 + step / 60 % 9;
+    slept += before;
+    BodySettings settings = both.simulation->bodies()[body];
+    BodyState state = both.simulation->states()[body];
+    if (step / 60 == 6) {
+      settings.material.friction = 0.1;
+      both.change(0, settings);  // the floor: all that lies on it wakes
+    } else if (step / 60 % 3 == 0) {
+      both.set_force(body, {{0.5, 0, 0}, {}});
+    } else if (step / 60 % 3 == 1) {
+      settings.gravity_scale = settings.gravity_scale == 1 ? 1.25 : 1;
+      both.change(body, settings);
+    } else {
+      state.position.z += 0.01;
+      both.place(body, state);
+    }
+    const std::uint32_t after = sleeping();
+    woke += before > after ? 1 : 0;
+  });
+  EXPECT_GT(slept, 30u);
+  EXPECT_GE(woke, 6u);
+}
+
+// What is not new wakes nobody.
+TEST(ParallelStep, SleepsOnWhereNothingChanges) {
+  FallingBodies one(1);
+  one.descriptions.emplace_back().asset = 3;
+  one.descriptions.back().pose = shift(0, 0, 0.1);
+  BothWays both(one);
+  both.steps(60, [](int) {});
+  ASSERT_TRUE(both.simulation->sleeps(1));
+  both.change(1, both.simulation->bodies()[1]);
+  both.set_force(1, {});
+  EXPECT_TRUE(both.simulation->sleeps(1));
+  EXPECT_NE(both.parallel.arrays().group[1], Sleep::kAwake);
+}
+
+// Going back gives the steps that followed, whatever happened meanwhile.
+TEST(ParallelStep, GoesBackToAState) {
+  const FallingBodies bodies(40, 7);
+  BothWays both(bodies, {}, 2);
+  both.set_force(5, {{0.2, 0, 0}, {}});
+  both.steps(50, [](int) {});
+  ParallelState<HostExecutor> state;
+  ASSERT_EQ(both.parallel.save(state), Status::kOk);
+  const SimulationState expected = both.simulation->save();
+  both.begin_call();
+  for (int run = 0; run < 2; ++run) {
+    both.steps(90, [&](int step) {
+      if (run > 0 || step != 20) return;
+      BodySettings settings = both.simulation->bodies()[3];
+      settings.gravity_scale = 3, settings.material.friction = 0;
+      both.change(3, settings);
+      both.change(0, settings);
+      both.set_force(4, {{0, 1, 0}, {}});
+      BodyState moved = both.simulation->states()[0];
+      moved.position.z -= 0.05;
+      both.place(0, moved);
+    });
+    ASSERT_EQ(both.parallel.restore(state), Status::kOk);
+    both.simulation->restore(expected);
+    both.began.clear(), both.ended.clear();
+    both.compare_touches(run);
+  }
+  EXPECT_GT(both.touching, 1000u);
+}
+
 // Boxes that stand side by side, a hair apart, and the first is pushed: of what the others do in the step
 // nobody knows when it begins.
 TEST(ParallelStep, FindsWhatAStepMissed) {
@@ -171,8 +276,15 @@ TEST(ParallelStep, IsMadeAgainWhereRoomIsShort) {
     body.pose.translation[2] += 0.001 * (i % 7);
   }
   BothWays both(many, {}, 2);
-  for (int step = 0; step < 3 && !HasFatalFailure(); ++step) both.step(step);
+  ParallelState<HostExecutor> start;
+  ASSERT_EQ(both.parallel.save(start), Status::kOk);
+  both.steps(3, [](int) {});
   EXPECT_GT(both.parallel.counts().pairs, 8 * 700u);
+  // Going back to before there was room gives the same.
+  const std::vector<BodyState> states(both.states().begin(), both.states().end());
+  ASSERT_EQ(both.parallel.restore(start), Status::kOk);
+  for (int step = 0; step < 3; ++step) ASSERT_EQ(both.parallel.step(1.0 / 60), Status::kOk);
+  EXPECT_TRUE(same_rows<BodyState>(both.states(), states));
 }
 
 }  // namespace

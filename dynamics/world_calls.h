@@ -1,8 +1,8 @@
 #pragma once
 #include "dynamics/world_setup.h"
 
-/// What callers of a world ask for, as its parts take it. Result: kOk, or what World's functions of these names
-/// say.
+/// What callers of a world ask for, as its parts take it. Result: kOk, or what World's functions of these
+/// names say.
 namespace tandem::dynamics {
 
 /// Returns whether a step may take so many seconds.

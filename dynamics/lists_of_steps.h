@@ -6,6 +6,8 @@
 #include <utility>
 #include <vector>
 
+#include "dynamics/pair_touch.h"
+
 namespace tandem::dynamics {
 
 /// Returns what lists of pairs of bodies are sorted by. Row: has bodies a and b.
@@ -33,9 +35,7 @@ void add_touches(std::span<const Row> began, std::span<const Row> touching, std:
   for (Row& row : to) {
     const auto now = std::ranges::lower_bound(touching, bodies_of(row), {}, bodies_of<Row>);
     if (now == touching.end() || bodies_of(*now) != bodies_of(row)) continue;
-    const double speed = std::max(row.speed, now->speed);
-    if (now->impulse > row.impulse) row = *now;
-    row.speed = speed;
+    take_hardest(row, *now);
   }
 }
 

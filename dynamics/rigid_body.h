@@ -16,7 +16,12 @@ struct BodySettings {
   Material material;
   double gravity_scale = 1;  ///< the part of gravity that acts on it
 
-  friend bool operator==(const BodySettings&, const BodySettings&) = default;
+  // nvcc defines no default operator for the host.
+  friend bool operator==(const BodySettings& p, const BodySettings& q) {
+    return p.gravity_scale == q.gravity_scale && p.material.friction == q.material.friction &&
+           p.material.restitution == q.material.restitution &&
+           p.material.rolling_resistance == q.material.rolling_resistance;
+  }
 };
 
 /// The properties of a body, apart from where it is.
@@ -30,6 +35,12 @@ struct BodyProperties : BodySettings {
   Matrix3 inertia = Matrix3::identity();  ///< about the centre, along the file's axes
   Matrix3 inverse_inertia = Matrix3::identity();
 };
+
+/// Returns whether anybody wants to know of contacts between two bodies: of those of fixed ones, which there
+/// may be where one was placed, nobody does.
+TANDEM_HD inline bool are_told(const BodyProperties& a, const BodyProperties& b) {
+  return a.motion != Motion::fixed || b.motion != Motion::fixed;
+}
 
 /// The state of a body: where it is and how it moves, in the world.
 struct BodyState {

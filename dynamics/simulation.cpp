@@ -94,7 +94,7 @@ void Simulation::find_contacts(StepRecord& record) {
     return std::ranges::binary_search(known, pair_of(contact));
   });
   if (parts_.ahead) parts_.ahead->add_to(found_, parts_.contacts->kept(), ahead);
-  drop_contacts_of_unmoved();
+  drop_contacts_of_fixed();
   cache_.update(found_, parts_.contacts->kept(), ahead);
   record.generation += stopwatch.lap();
   record.contacts = cache_.contacts().size();
@@ -105,13 +105,11 @@ void Simulation::find_contacts(StepRecord& record) {
   }
 }
 
-// A fixed body that was placed is asked for contacts with all that does not move, of which only those with
-// sleeping bodies count.
-void Simulation::drop_contacts_of_unmoved() {
+// A fixed body that was placed is asked for contacts with all other bodies.
+void Simulation::drop_contacts_of_fixed() {
   if (placed_.empty()) return;
   std::erase_if(found_, [&](const ContactPoint& contact) {
-    return bodies_[contact.body_a].motion != Motion::moving &&
-           bodies_[contact.body_b].motion != Motion::moving;
+    return !are_told(bodies_[contact.body_a], bodies_[contact.body_b]);
   });
 }
 

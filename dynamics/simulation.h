@@ -142,7 +142,7 @@ class Simulation {
   void solve(StepRecord& record);
   std::vector<ContactImpulse> solve_contacts();
   bool find_missed(std::span<const BodyState> before);
-  void drop_contacts_of_unmoved();
+  void drop_contacts_of_fixed();
   void sleep();
   void wake_beside_placed();
   void update_acting();

@@ -5,37 +5,12 @@
 #include <utility>
 
 #include "dynamics/lists_of_steps.h"
+#include "dynamics/pair_touch.h"
 
 namespace tandem::dynamics {
 namespace {
 
 constexpr auto kBodies = bodies_of<WorldTouch>;
-
-// This sums up what the contacts of one pair do together.
-class PairTouch {
- public:
-  explicit PairTouch(const ContactPoint& first) : touch_{first.body_a, first.body_b, 0, 0, {}} {}
-
-  bool is_of(const ContactPoint& contact) const {
-    return touch_.a == contact.body_a && touch_.b == contact.body_b;
-  }
-  void add(const ContactPoint& contact, double impulse, double approach) {
-    touches_ = touches_ || contact.depth >= 0 || impulse > 0;
-    touch_.impulse += impulse;
-    touch_.speed = std::max(touch_.speed, approach);
-    if (std::pair(impulse, contact.depth) <= hardest_) return;
-    hardest_ = {impulse, contact.depth};
-    for (int k = 0; k < 3; ++k) touch_.position[k] = at(contact.position, k);
-  }
-  void write(std::vector<WorldTouch>& to) const {
-    if (touches_) to.push_back(touch_);
-  }
-
- private:
-  WorldTouch touch_;
-  bool touches_ = false;
-  std::pair<double, double> hardest_ = {-INFINITY, 0};  // an impulse, and a depth
-};
 
 }  // namespace
 
@@ -44,10 +19,11 @@ void Touches::update(std::span<const ContactPoint> contacts, std::span<const Con
   before_.swap(touching_);
   touching_.clear(), began_.clear(), ended_.clear();
   for (std::size_t i = 0; i < contacts.size();) {
-    PairTouch pair(contacts[i]);
-    for (; i < contacts.size() && pair.is_of(contacts[i]); ++i)
+    const ObjectPair bodies = pair_of(contacts[i]);
+    PairTouch pair(bodies);
+    for (; i < contacts.size() && pair_of(contacts[i]) == bodies; ++i)
       pair.add(contacts[i], impulses[i].normal, approach[i]);
-    pair.write(touching_);
+    if (pair.touches()) touching_.push_back(pair.touch());
   }
   const auto awake = static_cast<std::ptrdiff_t>(touching_.size());
   std::ranges::copy_if(before_, std::back_inserter(touching_),

@@ -10,8 +10,8 @@
 #include "dynamics/lists_of_steps.h"
 #include "dynamics/scene_contacts.h"
 #include "dynamics/simulation.h"
+#include "dynamics/world_calls.h"
 #include "dynamics/world_rows.h"
-#include "dynamics/world_setup.h"
 #include "tandem/kernels/excluded_pairs.h"
 
 namespace tandem {
@@ -55,8 +55,6 @@ struct World::Parts {
   void read_contacts();
   void read_joints();
 };
-
-namespace {}  // namespace
 
 World::World() : parts_(new (std::nothrow) Parts) {}
 World::World(World&&) noexcept = default;
@@ -165,15 +163,19 @@ void World::Parts::read_joints() {
 }
 
 Status World::step(double dt, std::uint32_t steps) {
+  if (parts_ != nullptr && is_duration(dt)) parts_->forget_call();
+  return step_more(dt, steps);
+}
+
+Status World::step_more(double dt, std::uint32_t steps) {
   if (parts_ == nullptr) return Status::kOutOfMemory;
-  if (!(dt > 0 && dt <= 1000)) return fail(Status::kBadDuration);
+  if (!is_duration(dt)) return fail(Status::kBadDuration);
   if (parts_->simulation == nullptr) return fail(Status::kOk);
   Parts& parts = *parts_;
   Simulation& simulation = *parts.simulation;
   Status status = Status::kOk;
   std::uint64_t blamed = 0;
   try {
-    parts.forget_call();
     simulation.set_step(dt);
     if (steps > 0) parts.dt = dt;
     for (std::uint32_t i = 0; i < steps && status == Status::kOk; ++i) {
@@ -304,13 +306,9 @@ double World::mass_of(std::uint32_t body) const {
 
 Status World::set(std::uint32_t body, const BodyMotion& motion) {
   if (body >= bodies().size()) return fail(Status::kUnknownInstance, body);
-  if (!is_rigid(motion.pose)) return fail(Status::kPoseNotRigid, body);
-  BodyState state = state_of(parts_->simulation->bodies()[body], motion.pose);
-  state.velocity = vector_of(motion.velocity);
-  state.angular_velocity = vector_of(motion.angular_velocity);
-  if (!is_usable(state)) return fail(Status::kOutOfRange, body);
-  if (parts_->simulation->bodies()[body].motion == Motion::fixed)
-    state.velocity = state.angular_velocity = Vector3{};
+  BodyState state;
+  const Status status = read_set(parts_->simulation->bodies()[body], motion, state);
+  if (status != Status::kOk) return fail(status, body);
   try {
     parts_->simulation->place(body, state);
   } catch (const std::bad_alloc&) {
@@ -345,8 +343,8 @@ Status World::push(std::uint32_t body, const double (&impulse)[3], const double 
   const BodyProperties& of = parts_->simulation->bodies()[body];
   if (of.motion != Motion::moving) return fail(Status::kOk);
   BodyState state = parts_->simulation->states()[body];
-  push_at(of, vector_of(impulse), vector_of(at), state);
-  if (!is_usable(state)) return fail(Status::kOutOfRange, body);
+  const Status status = read_push(of, impulse, at, state);
+  if (status != Status::kOk) return fail(status, body);
   parts_->simulation->place(body, state);
   parts_->read();
   return fail(Status::kOk);
@@ -354,10 +352,11 @@ Status World::push(std::uint32_t body, const double (&impulse)[3], const double 
 
 Status World::set_force(std::uint32_t body, const double (&force)[3], const double (&torque)[3]) {
   if (body >= bodies().size()) return fail(Status::kUnknownInstance, body);
-  if (parts_->simulation->bodies()[body].motion != Motion::moving) return fail(Status::kOk);
-  const BodyForce to = {vector_of(force), vector_of(torque)};
-  const Pull pull = pull_on(parts_->simulation->bodies()[body], parts_->simulation->states()[body], {}, to);
-  if (!(pull.most() <= kFastest)) return fail(Status::kOutOfRange, body);
+  const BodyProperties& of = parts_->simulation->bodies()[body];
+  if (of.motion != Motion::moving) return fail(Status::kOk);
+  BodyForce to;
+  const Status status = read_force(of, parts_->simulation->states()[body], force, torque, to);
+  if (status != Status::kOk) return fail(status, body);
   try {
     parts_->simulation->set_force(body, to);
   } catch (const std::bad_alloc&) {

@@ -81,6 +81,7 @@ class CudaExecutor {
     Status grow(std::uint64_t count, std::uint64_t kept) { return status_of(array_.grow(count, kept)); }
     T* data() const { return array_.data(); }
     std::uint64_t room() const { return array_.room(); }
+    std::size_t bytes() const { return array_.bytes(); }
 
    private:
     GpuArray<T> array_;
@@ -133,6 +134,9 @@ class CudaExecutor {
     later_ = sequence.later_;
     if (error_ == cudaSuccess) take(cudaGraphLaunch(sequence.graph_, stream_));
   }
+
+  /// GPU memory held, but for arrays.
+  std::size_t bytes() const { return scratch_.bytes() + other_keys_.bytes() + other_values_.bytes(); }
 
   cudaStream_t stream() const { return stream_; }
   void set_stream(cudaStream_t stream) { stream_ = stream; }
@@ -213,6 +217,12 @@ class CudaExecutor {
   Status copy(const T* from, std::span<T> to) {
     take(cudaMemcpyAsync(to.data(), from, to.size_bytes(), cudaMemcpyDeviceToHost, stream_));
     return wait();
+  }
+
+  template <typename T>
+  void copy_within(const T* from, std::uint64_t count, T* to) {
+    if (error_ == cudaSuccess && count > 0)
+      take(cudaMemcpyAsync(to, from, count * sizeof(T), cudaMemcpyDeviceToDevice, stream_));
   }
 
   template <typename T>

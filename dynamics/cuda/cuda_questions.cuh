@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "dynamics/cuda/cuda_executor.cuh"
+#include "dynamics/parallel/bytes_of.h"
 #include "dynamics/parallel/pair_step.h"
 #include "tandem/kernels/gpu_broad_phase.h"
 #include "tandem/kernels/gpu_contact_query.h"
@@ -122,6 +123,9 @@ class CudaQuestions {
     }
     return cudaSuccess;
   }
+
+  /// Returns the GPU memory held.
+  std::size_t bytes() const { return bytes_of(bounds_, needs_, near_, contacts_, manifolds_, distances_); }
 
   Status reserve(std::uint32_t bodies, std::uint32_t pairs) {
     bodies_ = bodies;

@@ -9,8 +9,8 @@
 #include "dynamics/cuda/cuda_questions.cuh"
 #include "dynamics/parallel/parallel_simulation.h"
 #include "dynamics/parallel/wake_step.h"
+#include "dynamics/world_calls.h"
 #include "dynamics/world_rows.h"
-#include "dynamics/world_setup.h"
 #include "tandem/kernels/excluded_pairs.h"
 #include "tandem/runtime/upload.h"
 
@@ -19,6 +19,20 @@ namespace tandem {
 using namespace dynamics;
 
 static_assert(sizeof(GpuBodyState) == sizeof(BodyState));
+
+namespace {
+
+using GpuSimulation = ParallelSimulation<CudaExecutor, CudaQuestions>;
+
+}  // namespace
+
+class GpuWorld::State {
+ public:
+  std::shared_ptr<const char> of;  // Parts::placed of the bodies whose state it is
+  double time;
+  std::vector<BodyProperties> properties;
+  ParallelState<CudaExecutor> simulation;
+};
 
 struct GpuWorld::Parts {
   std::vector<AssetView> assets;
@@ -29,11 +43,13 @@ struct GpuWorld::Parts {
   cudaStream_t own_stream = nullptr;
   CudaExecutor executor;
   CudaQuestions questions{executor};
-  std::optional<ParallelSimulation<CudaExecutor, CudaQuestions>> simulation;
+  std::optional<GpuSimulation> simulation;
+  std::shared_ptr<const char> placed;  // of these bodies alone; null where there are none
   std::vector<BodyProperties> properties;
   GpuArray<std::uint32_t> group, mask, world;
   GpuExcludedPairs excluded;
   ParallelOptions options;
+  bool has_contacts = false;  // those of the last step are there
   double time = 0;
   std::uint64_t where = 0;
 
@@ -45,7 +61,8 @@ struct GpuWorld::Parts {
   std::vector<ContactPoint> points;
   std::vector<ContactImpulse> done;
   std::vector<WorldContact> contacts;
-  std::vector<ObjectPair> touching;
+  std::vector<WorldTouch> touching, began;
+  std::vector<ObjectPair> ended;
 
   Parts() = default;
   Parts(const Parts&) = delete;
@@ -56,13 +73,15 @@ struct GpuWorld::Parts {
 
   bool has_bodies() const { return simulation.has_value() && !properties.empty(); }
   void clear() {
-    simulation.reset();
-    properties.clear(), bodies.clear(), contacts.clear(), touching.clear();
-    time = 0, where = 0;
+    simulation.reset(), placed.reset();
+    properties.clear();
+    has_contacts = false, time = 0, where = 0;
   }
   Status upload_filter(const WorldSetup& setup, std::span<const ObjectPair> excluded_pairs);
-  Status read_records();
-  Status write_state(std::uint32_t body, const BodyState& state);
+  Status read_contacts();
+  Status read_state(std::uint32_t body, BodyState& state);
+  template <typename Row, typename Get>
+  Status list(const Get& get, std::vector<Row>& rows, std::span<const Row>& out);
 };
 
 namespace {
@@ -144,6 +163,7 @@ Status GpuWorld::set_bodies(std::span<const BodyDescription> bodies, const World
       return fail(status);
     }
     parts.properties = std::move(setup.properties);
+    parts.placed = std::make_shared<char>();
   } catch (const std::bad_alloc&) {
     parts.clear();
     return fail(Status::kOutOfMemory);
@@ -167,12 +187,18 @@ Status GpuWorld::Parts::upload_filter(const WorldSetup& setup, std::span<const O
 }
 
 Status GpuWorld::step(double dt, std::uint32_t steps) {
+  if (parts_ != nullptr && is_duration(dt) && parts_->has_bodies()) parts_->simulation->forget_call();
+  return step_more(dt, steps);
+}
+
+Status GpuWorld::step_more(double dt, std::uint32_t steps) {
   if (parts_ == nullptr) return Status::kOutOfMemory;
-  if (!(dt > 0 && dt <= 1000)) return fail(Status::kBadDuration);
+  if (!is_duration(dt)) return fail(Status::kBadDuration);
   if (!parts_->has_bodies()) return fail(Status::kOk);
   Parts& parts = *parts_;
   for (std::uint32_t i = 0; i < steps; ++i) {
     const Status status = parts.simulation->step(dt);
+    parts.has_contacts = status == Status::kOk;
     if (status != Status::kOk) {
       const bool of_body = status == Status::kOutOfRange && parts.simulation->bad_body() != kNoIndex;
       return fail(status, of_body ? parts.simulation->bad_body() : parts.questions.where());
@@ -204,22 +230,22 @@ Status GpuWorld::bodies(std::span<const BodyMotion>& bodies) {
 }
 
 // The records of the last step are those before the next one.
-Status GpuWorld::Parts::read_records() {
-  return read(executor, simulation->arrays().records_before, simulation->counts().pairs, records);
+Status GpuWorld::Parts::read_contacts() {
+  const StepArrays a = simulation->arrays();
+  const StepCounts& counts = simulation->counts();
+  Status status = read(executor, a.records_before, counts.pairs, records);
+  if (status == Status::kOk) status = read(executor, a.contacts, counts.remembered, points);
+  if (status == Status::kOk) status = read(executor, a.done, counts.remembered, done);
+  return status;
 }
 
 Status GpuWorld::contacts(std::span<const WorldContact>& contacts) {
   contacts = {};
   if (parts_ == nullptr) return Status::kOutOfMemory;
-  if (!parts_->has_bodies()) return Status::kOk;
+  if (!parts_->has_contacts) return fail(Status::kOk);
   Parts& parts = *parts_;
   try {
-    const StepArrays a = parts.simulation->arrays();
-    const std::size_t room = std::min(parts.simulation->counts().remembered, a.most_remembered);
-    Status status = parts.read_records();
-    if (status == Status::kOk) status = read(parts.executor, a.contacts, room, parts.points);
-    if (status == Status::kOk) status = read(parts.executor, a.done, room, parts.done);
-    if (status != Status::kOk) return fail(status);
+    if (const Status status = parts.read_contacts(); status != Status::kOk) return fail(status);
     parts.contacts.clear();
     for (const PairRecord& record : parts.records) {
       for (std::uint32_t k = record.first_contact; k < record.first_contact + record.contacts; ++k) {
@@ -230,25 +256,38 @@ Status GpuWorld::contacts(std::span<const WorldContact>& contacts) {
     return fail(Status::kOutOfMemory);
   }
   contacts = parts.contacts;
-  return Status::kOk;
+  return fail(Status::kOk);
 }
 
-Status GpuWorld::touching(std::span<const ObjectPair>& touching) {
+// Lists pairs by a function of the simulation.
+template <typename Row, typename Get>
+Status GpuWorld::Parts::list(const Get& get, std::vector<Row>& rows, std::span<const Row>& out) {
+  if (!has_bodies()) return Status::kOk;
+  try {
+    const Status status = ((*simulation).*get)(rows);
+    if (status == Status::kOk) out = rows;
+    return status;
+  } catch (const std::bad_alloc&) {
+    return Status::kOutOfMemory;
+  }
+}
+
+Status GpuWorld::touching(std::span<const WorldTouch>& touching) {
   touching = {};
   if (parts_ == nullptr) return Status::kOutOfMemory;
-  if (!parts_->has_bodies()) return Status::kOk;
-  Parts& parts = *parts_;
-  try {
-    if (const Status status = parts.read_records(); status != Status::kOk) return fail(status);
-    parts.touching.clear();
-    for (const PairRecord& record : parts.records) {
-      if (record.touches) parts.touching.push_back(record.pair);
-    }
-  } catch (const std::bad_alloc&) {
-    return fail(Status::kOutOfMemory);
-  }
-  touching = parts.touching;
-  return Status::kOk;
+  return fail(parts_->list(&GpuSimulation::touching, parts_->touching, touching));
+}
+
+Status GpuWorld::began(std::span<const WorldTouch>& began) {
+  began = {};
+  if (parts_ == nullptr) return Status::kOutOfMemory;
+  return fail(parts_->list(&GpuSimulation::began, parts_->began, began));
+}
+
+Status GpuWorld::ended(std::span<const ObjectPair>& ended) {
+  ended = {};
+  if (parts_ == nullptr) return Status::kOutOfMemory;
+  return fail(parts_->list(&GpuSimulation::ended, parts_->ended, ended));
 }
 
 GpuBodyState* GpuWorld::states() const {
@@ -266,23 +305,15 @@ Status GpuWorld::wake() {
   return fail(parts_->executor.wait());
 }
 
-Status GpuWorld::Parts::write_state(std::uint32_t body, const BodyState& state) {
-  const StepArrays a = simulation->arrays();
-  const Status status = executor.copy(std::span<const BodyState>(&state, 1), a.start + body);
-  if (status == Status::kOk) wake_body(executor, a, body);
-  return executor.wait();
-}
-
 Status GpuWorld::set(std::uint32_t body, const BodyMotion& motion) {
   if (body >= body_count()) return fail(Status::kUnknownInstance, body);
-  if (!is_rigid(motion.pose)) return fail(Status::kPoseNotRigid, body);
-  const BodyProperties& of = parts_->properties[body];
-  BodyState state = state_of(of, motion.pose);
-  state.velocity = vector_of(motion.velocity);
-  state.angular_velocity = vector_of(motion.angular_velocity);
-  if (!is_usable(state)) return fail(Status::kOutOfRange, body);
-  if (of.motion == Motion::fixed) state.velocity = state.angular_velocity = Vector3{};
-  return fail(parts_->write_state(body, state));
+  BodyState state;
+  const Status status = read_set(parts_->properties[body], motion, state);
+  return status == Status::kOk ? fail(parts_->simulation->place(body, state)) : fail(status, body);
+}
+
+Status GpuWorld::Parts::read_state(std::uint32_t body, BodyState& state) {
+  return executor.copy(simulation->arrays().start + body, std::span(&state, 1));
 }
 
 Status GpuWorld::push(std::uint32_t body, const double (&impulse)[3], const double (&at)[3]) {
@@ -290,27 +321,69 @@ Status GpuWorld::push(std::uint32_t body, const double (&impulse)[3], const doub
   const BodyProperties& of = parts_->properties[body];
   if (of.motion != Motion::moving) return fail(Status::kOk);
   BodyState state;
-  const Status status =
-      parts_->executor.copy(parts_->simulation->arrays().start + body, std::span(&state, 1));
-  if (status != Status::kOk) return fail(status);
-  push_at(of, vector_of(impulse), vector_of(at), state);
-  if (!is_usable(state)) return fail(Status::kOutOfRange, body);
-  return fail(parts_->write_state(body, state));
+  if (const Status status = parts_->read_state(body, state); status != Status::kOk) return fail(status);
+  const Status status = read_push(of, impulse, at, state);
+  return status == Status::kOk ? fail(parts_->simulation->place(body, state)) : fail(status, body);
 }
 
 Status GpuWorld::set_force(std::uint32_t body, const double (&force)[3], const double (&torque)[3]) {
   if (body >= body_count()) return fail(Status::kUnknownInstance, body);
   const BodyProperties& of = parts_->properties[body];
   if (of.motion != Motion::moving) return fail(Status::kOk);
-  const BodyForce to = {vector_of(force), vector_of(torque)};
   BodyState state;
-  Status status = parts_->executor.copy(parts_->simulation->arrays().start + body, std::span(&state, 1));
+  BodyForce to;
+  if (const Status status = parts_->read_state(body, state); status != Status::kOk) return fail(status);
+  const Status status = read_force(of, state, force, torque, to);
+  return status == Status::kOk ? fail(parts_->simulation->set_force(body, to)) : fail(status, body);
+}
+
+// change(settings): makes them what they are to be.
+template <typename Change>
+Status GpuWorld::change(std::uint32_t body, const Change& change) {
+  if (body >= body_count()) return fail(Status::kUnknownInstance, body);
+  BodySettings settings = parts_->properties[body];
+  change(settings);
+  if (!is_usable(settings)) return fail(Status::kOutOfRange, body);
+  const Status status = parts_->simulation->change(body, settings);
+  if (status == Status::kOk) static_cast<BodySettings&>(parts_->properties[body]) = settings;
+  return fail(status);
+}
+
+Status GpuWorld::set_material(std::uint32_t body, const Material& material) {
+  return change(body, [&](BodySettings& settings) { settings.material = material; });
+}
+
+Status GpuWorld::set_gravity_scale(std::uint32_t body, double gravity_scale) {
+  return change(body, [&](BodySettings& settings) { settings.gravity_scale = gravity_scale; });
+}
+
+Status GpuWorld::save(std::shared_ptr<const State>& state) const {
+  if (parts_ == nullptr) return Status::kOutOfMemory;
+  try {
+    auto kept = std::make_shared<State>();
+    kept->of = parts_->placed, kept->time = parts_->time;
+    if (parts_->has_bodies()) {
+      kept->properties = parts_->properties;
+      const Status status = parts_->simulation->save(kept->simulation);
+      if (status != Status::kOk) return fail(status);
+    }
+    state = std::move(kept);
+  } catch (const std::bad_alloc&) {
+    return fail(Status::kOutOfMemory);
+  }
+  return fail(Status::kOk);
+}
+
+Status GpuWorld::restore(const State& state) {
+  if (parts_ == nullptr) return Status::kOutOfMemory;
+  if (state.of != parts_->placed) return fail(Status::kKeptMismatch);
+  if (!parts_->has_bodies()) return fail(Status::kOk);
+  parts_->has_contacts = false;
+  const Status status = parts_->simulation->restore(state.simulation);
   if (status != Status::kOk) return fail(status);
-  if (!(pull_on(of, state, {}, to).most() <= kFastest)) return fail(Status::kOutOfRange, body);
-  bool is_new = false;
-  status = parts_->simulation->set_force(body, to, is_new);
-  if (status == Status::kOk && is_new) wake_body(parts_->executor, parts_->simulation->arrays(), body);
-  return fail(status == Status::kOk ? parts_->executor.wait() : status);
+  std::ranges::copy(state.properties, parts_->properties.begin());
+  parts_->time = state.time;
+  return fail(Status::kOk);
 }
 
 double GpuWorld::mass_of(std::uint32_t body) const {
@@ -335,6 +408,13 @@ double GpuWorld::time() const {
 
 std::uint64_t GpuWorld::where() const {
   return parts_ != nullptr ? parts_->where : 0;
+}
+
+std::size_t GpuWorld::bytes() const {
+  if (parts_ == nullptr) return 0;
+  const Parts& parts = *parts_;
+  return bytes_of(parts.executor, parts.questions, parts.group, parts.mask, parts.world, parts.excluded) +
+         (parts.simulation.has_value() ? parts.simulation->bytes() : 0);
 }
 
 }  // namespace tandem

@@ -33,6 +33,7 @@ class HostExecutor {
     }
     T* data() const { return const_cast<T*>(elements_.data()); }
     std::uint64_t room() const { return elements_.size(); }
+    std::size_t bytes() const { return elements_.size() * sizeof(T); }
 
    private:
     std::vector<T> elements_;
@@ -127,6 +128,12 @@ class HostExecutor {
   Status copy(const T* from, std::span<T> to) {
     std::copy_n(from, to.size(), to.begin());
     return Status::kOk;
+  }
+
+  /// Queues a copy within the executor's memory.
+  template <typename T>
+  void copy_within(const T* from, std::uint64_t count, T* to) {
+    std::copy_n(from, count, to);
   }
 
   /// Copies a value, which is there after wait(): of several, the CPU waits once. It may be a small one.

@@ -36,7 +36,8 @@ struct JointSweeps {
   TANDEM_HD bool hold(std::uint32_t body) const { return joints.joints_of[body] > 0; }
 
   /// Returns how many turns joints have had at a body that moves before a sweep.
-  TANDEM_HD std::uint32_t turns_before(std::uint32_t body, std::uint32_t sweep, std::uint32_t substeps) const {
+  TANDEM_HD std::uint32_t turns_before(std::uint32_t body, std::uint32_t sweep,
+                                       std::uint32_t substeps) const {
     return phases_before(sweep, substeps) * joints.joints_of[body];
   }
 

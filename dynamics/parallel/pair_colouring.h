@@ -4,6 +4,7 @@
 
 #include "dynamics/pair_colours.h"
 #include "dynamics/parallel/atomics.h"
+#include "dynamics/parallel/bytes_of.h"
 #include "dynamics/parallel/contact_pair.h"
 #include "dynamics/parallel/turns.h"
 #include "dynamics/parallel/worker.h"
@@ -234,6 +235,7 @@ class PairColouring {
 
   /// The result of the last find().
   const ColouringView& view() const { return view_; }
+  std::size_t bytes() const { return bytes_of(numbers_, taken_, of_bodies_, of_pairs_, turns_); }
 
  private:
   ColouringView view_of(const ContactPairs& pairs) const {

@@ -146,6 +146,7 @@ class PairGroups {
   /// The result of the last make().
   const GroupsView& view() const { return view_; }
   const SoftStepNeeds* needs() const { return needs_.data(); }
+  std::size_t bytes() const { return bytes_of(needs_, colours_, numbers_, place_, pair_of_, of_groups_); }
 
  private:
   GroupsView view_of(const ColouringView& colouring) const {

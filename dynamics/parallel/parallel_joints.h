@@ -5,9 +5,16 @@
 #include <utility>
 #include <vector>
 
+#include "dynamics/parallel/bytes_of.h"
 #include "dynamics/parallel/joint_arrays.h"
 
 namespace tandem::dynamics {
+
+/// The joints of a state that is kept, in the CPU's memory.
+struct ParallelJointState {
+  std::vector<Joint> joints;
+  std::vector<JointMemory> memory;
+};
 
 /// The joints of a ParallelSimulation. The CPU knows them, and their order, which it finds whenever they
 /// change; where they are is known in the executor's memory alone.
@@ -69,6 +76,22 @@ class ParallelJoints {
     return put_joints(to, joints_.size());
   }
 
+  Status save(Executor& to, ParallelJointState& state) const {
+    state.joints = joints_;
+    return read(to, state.memory);
+  }
+  /// Condition: there have been joints, or the state has none.
+  Status restore(Executor& to, const ParallelJointState& state) {
+    joints_ = state.joints, broken_.clear();
+    const Status status = motions_.empty() ? Status::kOk : put_joints(to, 0);
+    if (status != Status::kOk || joints_.empty()) return status;
+    return to.copy(std::span<const JointMemory>(state.memory), memory_[0].data());
+  }
+
+  std::size_t bytes() const {
+    return bytes_of(of_joints_, memory_[0], memory_[1], broke_, places_, colour_end_, joints_of_, soft_);
+  }
+
   std::span<const Joint> all() const { return joints_; }
   std::span<const std::uint32_t> broken() const { return broken_; }
 
@@ -107,11 +130,10 @@ class ParallelJoints {
     const JointOrder order = find_joint_order(joints_, motions_);
     tasks_ = order.tasks(), colours_ = static_cast<std::uint32_t>(order.colour_end.size());
     Status out = Status::kOk;
-    for (Status status :
-         {put(to, of_joints_, joints_), put(to, places_, order.places), put(to, colour_end_, order.colour_end),
-          put(to, joints_of_, order.joints_of), memory_[0].grow(joints_.size(), kept),
-          memory_[1].reserve(joints_.size()), broke_.reserve(joints_.size()),
-          soft_.reserve(order.places.size())}) {
+    for (Status status : {put(to, of_joints_, joints_), put(to, places_, order.places),
+                          put(to, colour_end_, order.colour_end), put(to, joints_of_, order.joints_of),
+                          memory_[0].grow(joints_.size(), kept), memory_[1].reserve(joints_.size()),
+                          broke_.reserve(joints_.size()), soft_.reserve(order.places.size())}) {
       if (out == Status::kOk) out = status;
     }
     return out;

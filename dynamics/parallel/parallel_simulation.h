@@ -1,6 +1,7 @@
 #pragma once
 #include <algorithm>
 #include <cstdint>
+#include <initializer_list>
 #include <span>
 #include <utility>
 #include <vector>
@@ -9,6 +10,7 @@
 #include "dynamics/parallel/parallel_joints.h"
 #include "dynamics/parallel/sleep_step.h"
 #include "dynamics/parallel/soft_step.h"
+#include "dynamics/parallel/touch_lists.h"
 #include "dynamics/parallel/wake_step.h"
 
 namespace tandem::dynamics {
@@ -49,6 +51,17 @@ struct ParallelOptions {
   SleepOptions sleep;
 };
 
+/// All that the next steps of a parallel simulation depend on, beside what bodies are and options; its bytes
+/// lie in the executor's memory, but for those of joints.
+template <typename Executor>
+struct ParallelState {
+  typename Executor::template Array<char> bytes;
+  std::uint32_t records = 0, remembered = 0;  ///< rows
+  double within = 0;
+  bool has_forces = false;
+  ParallelJointState joints;
+};
+
 /// Moves rigid bodies as Simulation does, by the same rules, all bodies and pairs side by side. All that a
 /// step needs lies in the executor's memory; the CPU looks at a few counts once a step. A step for which
 /// there is too little room is made again with more, and nothing is lost.
@@ -71,6 +84,7 @@ class ParallelSimulation {
     options_ = options;
     within_ = 0, has_forces_ = false, ++generation_;
     most_pairs_ = most_moved_ = most_found_ = most_remembered_ = 0;
+    records_count_ = remembered_count_ = 0;
     for (Status status :
          {joints_.set(to_, bodies.joints, bodies.properties, bodies.states), reserve_bodies(bodies),
           reserve_pairs(std::max(1024u, 8 * bodies_)), reserve_moved(std::max(256u, bodies_ / 2)),
@@ -103,16 +117,85 @@ class ParallelSimulation {
     return Status::kOutOfMemory;
   }
 
-  /// Sets what acts on a body from the next step on, beside gravity and contacts. is_new: whether that is
-  /// another force than before.
-  Status set_force(std::uint32_t body, const BodyForce& force, bool& is_new) {
+  // These do what Simulation's functions of these names do.
+  Status place(std::uint32_t body, const BodyState& state) {
+    const StepArrays a = arrays();
+    const Status status = to_.copy(std::span(&state, 1), a.start + body);
+    if (status == Status::kOk) wake_body(to_, a, body, true);
+    return to_.wait();
+  }
+  Status set_force(std::uint32_t body, const BodyForce& force) {
     Status status = has_forces_ ? Status::kOk : fill<BodyForce>(forces_, {});
-    BodyForce before;
-    if (status == Status::kOk) status = to_.copy(forces_.data() + body, std::span(&before, 1));
     if (status != Status::kOk) return status;
     if (!has_forces_) has_forces_ = true, ++generation_;
-    is_new = !(before == force);
-    return to_.copy(std::span<const BodyForce>(&force, 1), forces_.data() + body);
+    return change_and_wake<BodyForce>(body, force, {forces_.data() + body});
+  }
+  Status change(std::uint32_t body, const BodySettings& settings) {
+    return change_and_wake<BodySettings>(body, settings, {properties_.data() + body, acting_.data() + body});
+  }
+
+  /// Keeps the state, and goes on where save() was called. Condition of restore(): the state is of this
+  /// simulation, since its bodies were set. There are no contacts then, and nothing has begun or ended.
+  Status save(ParallelState<Executor>& state) {
+    state.records = records_count_, state.remembered = remembered_count_;
+    state.within = within_, state.has_forces = has_forces_;
+    std::size_t bytes = 0;
+    visit_kept(state, [&](const auto&, std::size_t count) { bytes += count; });
+    const Status status = state.bytes.reserve(bytes);
+    if (status != Status::kOk) return status;
+    std::size_t place = 0;
+    visit_kept(state, [&](const auto& array, std::size_t count) {
+      to_.copy_within(reinterpret_cast<const char*>(array.data()), count, state.bytes.data() + place);
+      place += count;
+    });
+    return joints_.save(to_, state.joints);
+  }
+  Status restore(const ParallelState<Executor>& state) {
+    if (has_forces_ != state.has_forces || within_ != state.within) ++generation_;
+    has_forces_ = state.has_forces, within_ = state.within;
+    records_count_ = state.records, remembered_count_ = state.remembered;
+    std::size_t place = 0;
+    visit_kept(state, [&](const auto& array, std::size_t count) {
+      to_.copy_within(state.bytes.data() + place, count, reinterpret_cast<char*>(array.data()));
+      place += count;
+    });
+    StepCounts counts = {};
+    counts.records_before = records_count_;
+    Status status = put(counts_, counts);
+    if (!joints_.all().empty()) ++generation_;
+    if (status == Status::kOk) status = joints_.restore(to_, state.joints);
+    if (status != Status::kOk) return status;
+    forget_call();
+    return to_.wait();
+  }
+
+  /// Lets began() and ended() begin anew.
+  void forget_call() {
+    const StepArrays a = arrays();
+    to_.for_each(&a.counts->records_before, a.most_pairs, ForgetCall{a.records_before});
+  }
+
+  /// Copy what World's functions of these names return: began and ended since forget_call().
+  Status touching(std::vector<WorldTouch>& pairs) {
+    return list(&PairRecord::touches, touches_[0].data(), listed_touches_, pairs);
+  }
+  Status began(std::vector<WorldTouch>& pairs) {
+    return list(&PairRecord::began, begun_[0].data(), listed_touches_, pairs);
+  }
+  Status ended(std::vector<ObjectPair>& pairs) {
+    return list(&PairRecord::ended, records_[0].data(), listed_pairs_, pairs);
+  }
+
+  /// Returns the bytes of the executor's memory that bodies, pairs and contacts take, but for those of
+  /// questions and the executor.
+  std::size_t bytes() const {
+    return bytes_of(solver_, joints_, properties_, acting_, states_[0], states_[1], states_[2], pulls_,
+                    forces_, placed_, idle_, asset_, group_, label_, marks_, pose_, motion_, ways_,
+                    ways_ahead_, quiet_, inner_radius_, boxes_, records_[0], records_[1], touches_[0],
+                    touches_[1], begun_[0], begun_[1], plans_, flags_, sums_, list_, row_first_, row_end_,
+                    asked_, moved_pairs_, reach_, moved_asset_, moved_pose_, approaches_, touching_, found_,
+                    contacts_, remembered_[0], remembered_[1], place_, contact_marks_, impulses_before_,
+                    impulses_, done_, counts_, listed_touches_, listed_pairs_);
   }
 
   /// The joints, by the place of each: what Simulation's functions of these names do. That joined bodies meet
@@ -160,6 +243,8 @@ class ParallelSimulation {
     a.inner_radius = inner_radius_.data(), a.boxes = boxes_.data();
     a.most_pairs = most_pairs_;
     a.records_before = records_[0].data(), a.records = records_[1].data();
+    a.touches_before = touches_[0].data(), a.touches = touches_[1].data();
+    a.begun_before = begun_[0].data(), a.begun = begun_[1].data();
     a.plans = plans_.data(), a.flags = flags_.data(), a.sums = sums_.data(), a.list = list_.data();
     a.asked = asked_.data(), a.reach = reach_.data();
     a.row_first = row_first_.data(), a.row_end = row_end_.data();
@@ -264,13 +349,61 @@ class ParallelSimulation {
   // The results of a step become what the next one begins with.
   Status go_on() {
     constexpr double kWide = 3;
+    records_count_ = read_.pairs, remembered_count_ = read_.remembered;
     std::swap(records_[0], records_[1]), std::swap(remembered_[0], remembered_[1]);
+    std::swap(touches_[0], touches_[1]), std::swap(begun_[0], begun_[1]);
     parity_ = 1 - parity_;
     if (read_.broken > 0) ++generation_;
     const Status joints = joints_.take_broken(to_, read_.broken > 0);
     const double needed = read_.reach.farthest(0.5 * options_.solver.slop);
     if (kWide * needed < within_) within_ = 1.5 * needed, ++generation_;
     return joints == Status::kOk ? to_.status() : joints;
+  }
+
+  // Calls visit(array, bytes) for each array of the state, and what of it is kept. Arrays grow, but do not
+  // shrink, and all that grew kept these.
+  template <typename Visit>
+  void visit_kept(const ParallelState<Executor>& state, const Visit& visit) const {
+    const auto rows = [&]<typename T>(const Array<T>& array, std::size_t count) {
+      visit(array, count * sizeof(T));
+    };
+    rows(properties_, bodies_), rows(acting_, bodies_);
+    rows(states_[0], bodies_), rows(states_[1], bodies_);
+    rows(placed_, bodies_), rows(quiet_, bodies_), rows(group_, bodies_);
+    if (state.has_forces) rows(forces_, bodies_);
+    rows(records_[0], state.records), rows(touches_[0], state.records);
+    rows(remembered_[0], state.remembered);
+  }
+
+  // Writes what is not what it was, and wakes the body then.
+  template <typename T>
+  Status change_and_wake(std::uint32_t body, const T& value, std::initializer_list<T*> places) {
+    T before;
+    Status status = to_.copy(*places.begin(), std::span(&before, 1));
+    if (status != Status::kOk || before == value) return status;
+    for (T* const place : places) {
+      if (status == Status::kOk) status = to_.copy(std::span(&value, 1), place);
+    }
+    if (status == Status::kOk) wake_body(to_, arrays(), body, false);
+    return to_.wait();
+  }
+
+  // Copies the rows of the records that have a flag. There are none before a step, whose counts are 0.
+  template <typename From, typename Row>
+  Status list(bool PairRecord::*flag, const From* from, Array<Row>& listed, std::vector<Row>& out) {
+    const StepArrays a = arrays();
+    std::uint32_t* const count = &a.counts->listed;
+    std::uint32_t found = 0;
+    to_.select(RecordIsListed{a.records_before, flag}, &a.counts->records_before, a.most_pairs, a.list,
+               count);
+    Status status = to_.copy(count, std::span(&found, 1));
+    out.clear();
+    if (status != Status::kOk || found == 0) return status;
+    status = listed.reserve(found);
+    if (status != Status::kOk) return status;
+    to_.for_each(count, found, CopyListed<From, Row>{from, a.list, listed.data()});
+    out.resize(found);
+    return to_.copy(listed.data(), std::span(out));
   }
 
   template <typename T>
@@ -310,10 +443,11 @@ class ParallelSimulation {
     const std::uint32_t kept = most_pairs_;
     Status out = Status::kOk;
     for (Status status :
-         {records_[0].grow(pairs, kept), records_[1].grow(pairs, kept), plans_.reserve(pairs),
-          flags_.reserve(pairs + 1), sums_.reserve(pairs + 1), list_.reserve(pairs), asked_.reserve(pairs),
-          reach_.reserve(pairs), row_first_.reserve(pairs), row_end_.reserve(pairs), touching_.reserve(pairs),
-          to_.reserve(pairs + 1), ask_.reserve(bodies_, pairs)}) {
+         {records_[0].grow(pairs, kept), records_[1].grow(pairs, kept), touches_[0].grow(pairs, kept),
+          touches_[1].grow(pairs, kept), begun_[0].grow(pairs, kept), begun_[1].grow(pairs, kept),
+          plans_.reserve(pairs), flags_.reserve(pairs + 1), sums_.reserve(pairs + 1), list_.reserve(pairs),
+          asked_.reserve(pairs), reach_.reserve(pairs), row_first_.reserve(pairs), row_end_.reserve(pairs),
+          touching_.reserve(pairs), to_.reserve(pairs + 1), ask_.reserve(bodies_, pairs)}) {
       if (out == Status::kOk) out = status;
     }
     most_pairs_ = out == Status::kOk ? pairs : 0;
@@ -358,7 +492,8 @@ class ParallelSimulation {
   ParallelJoints<Executor> joints_;
   ParallelOptions options_;
   std::uint32_t bodies_ = 0, most_pairs_ = 0, most_moved_ = 0, most_found_ = 0, most_remembered_ = 0;
-  double within_ = 0;  // how far apart near pairs are
+  std::uint32_t records_count_ = 0, remembered_count_ = 0;  // of the last step that was whole
+  double within_ = 0;                                       // how far apart near pairs are
   bool has_forces_ = false;
   StepCounts read_ = {};
   SoftStepNeeds solver_needs_ = {};
@@ -380,6 +515,7 @@ class ParallelSimulation {
   Array<double> quiet_, inner_radius_;
   Array<AssetBox> boxes_;
   Array<PairRecord> records_[2];
+  Array<WorldTouch> touches_[2], begun_[2];
   Array<PairPlan> plans_;
   Array<std::uint32_t> flags_, sums_, list_, row_first_, row_end_;
   Array<ObjectPair> asked_, moved_pairs_;
@@ -394,6 +530,9 @@ class ParallelSimulation {
   Array<std::uint8_t> contact_marks_;
   Array<ContactImpulse> impulses_before_, impulses_, done_;
   Array<StepCounts> counts_;
+
+  Array<WorldTouch> listed_touches_;
+  Array<ObjectPair> listed_pairs_;
 };
 
 }  // namespace tandem::dynamics

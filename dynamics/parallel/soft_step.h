@@ -183,6 +183,10 @@ class ParallelSoftStep {
     return status;
   }
   const SoftStepRoom& room() const { return room_; }
+  std::size_t bytes() const {
+    return bytes_of(colouring_, grouping_, bodies_, gains_, starts_, velocities_, moved_, bounces_, arrived_,
+                    groups_, turnings_, turns_, normals_, gaps_, frictions_);
+  }
 
   /// What the last step needed room for, in the executor's memory. Where it had too little it has written
   /// neither states nor impulses.

@@ -9,13 +9,15 @@
 #include "dynamics/rigid_body.h"
 #include "dynamics/step_solver.h"
 #include "kernels/geometry/pair_motion.h"
+#include "tandem/dynamics/world.h"
 #include "tandem/kernels/manifold.h"
 #include "tandem/kernels/moved_query.h"
 
 // What the visits of a parallel step read and write, in the memory of its executor.
 namespace tandem::dynamics {
 
-/// A pair of bodies that is remembered from step to step: it was near, or it has contacts.
+/// A pair of bodies that is remembered from step to step: it was near, it has contacts, or it began or ended
+/// to touch in the last call.
 struct PairRecord {
   ObjectPair pair;
   bool is_near;   ///< it was, in the last step
@@ -25,6 +27,7 @@ struct PairRecord {
   std::uint32_t first, count;             ///< of the remembered contacts
   std::uint32_t first_contact, contacts;  ///< of the contacts of the step
   bool touches;                           ///< in the last step, as Touches says
+  bool began, ended;                      ///< to touch, in a step of the last call
 };
 
 /// What becomes of a pair in a step.
@@ -46,6 +49,7 @@ struct StepCounts {
   std::uint32_t found, remembered, touching;  ///< contacts found, room for those remembered, pairs that push
   std::uint32_t broken;                       ///< joints that break at the end of the step
   std::uint32_t bad_body;                     ///< the first whose state is not usable, or kNoIndex
+  std::uint32_t listed;                       ///< pairs, between steps
   LargestReach reach;
 };
 
@@ -78,6 +82,8 @@ struct StepArrays {
   const std::uint32_t* near_count;
   std::uint32_t most_near;
   PairRecord *records_before, *records;
+  WorldTouch *touches_before, *touches;  ///< of records that touch
+  WorldTouch *begun_before, *begun;      ///< of records that began to touch, as World::began() says
   PairPlan* plans;
   std::uint32_t *flags, *sums;
   std::uint32_t* list;                 ///< pairs of a question, by place

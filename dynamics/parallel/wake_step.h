@@ -65,12 +65,12 @@ void wake_joined(Executor& to, const StepArrays& a, const Joint& joint) {
 /// Wakes a body, and what fell asleep with it. One that contacts do not move wakes what touches it or is
 /// joined to it; if it is placed anew, in the next step what it touches then.
 template <typename Executor>
-void wake_body(Executor& to, const StepArrays& a, std::uint32_t body) {
+void wake_body(Executor& to, const StepArrays& a, std::uint32_t body, bool is_placed) {
   using namespace wake_step_detail;
   const StepArrays of = a;
   clear_marks(to, a);
-  to.once([of, body] TANDEM_HD() {
-    if (of.properties[body].motion == Motion::fixed) of.placed[body] = 1;
+  to.once([of, body, is_placed] TANDEM_HD() {
+    if (is_placed && of.properties[body].motion == Motion::fixed) of.placed[body] = 1;
     mark_of(of, body) = 1;
   });
   to.for_each(&of.counts->records_before, a.most_pairs, [of, body] TANDEM_HD(std::uint32_t j) {

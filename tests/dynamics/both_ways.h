@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "dynamics/host_questions.h"
+#include "dynamics/lists_of_steps.h"
 #include "dynamics/parallel/parallel_simulation.h"
 #include "dynamics/scene_contacts.h"
 #include "dynamics/simulation.h"
@@ -18,6 +19,11 @@ namespace tandem::test {
 template <typename T>
 bool same_bytes(const T& p, const T& q) {
   return std::memcmp(&p, &q, sizeof p) == 0;
+}
+
+template <typename Row>
+bool same_rows(std::span<const Row> p, std::span<const Row> q) {
+  return p.size() == q.size() && (p.empty() || std::memcmp(p.data(), q.data(), p.size_bytes()) == 0);
 }
 
 /// Moves the same bodies by a Simulation and by a parallel simulation on threads of the CPU.
@@ -51,6 +57,19 @@ class BothWays {
                                                         std::move(parts), setup.options);
   }
 
+  /// Makes so many steps of a call. begin(step): before each.
+  template <typename Begin>
+  void steps(int count, const Begin& begin) {
+    for (int step = 0; step < count && !testing::Test::HasFatalFailure(); ++step)
+      begin(step), this->step(step);
+  }
+
+  /// A call of World::step() begins.
+  void begin_call() {
+    parallel.forget_call();
+    began.clear(), ended.clear();
+  }
+
   /// Makes a step both ways, and compares all that bodies and joints are.
   void step(int number) {
     simulation->step();
@@ -61,6 +80,10 @@ class BothWays {
           << number << " " << i;
     }
     compare_joints(number);
+    const dynamics::Touches& touches = simulation->touches();
+    dynamics::add_touches(touches.began(), touches.touching(), began);
+    dynamics::add_pairs(touches.ended(), ended);
+    compare_touches(number);
     if (!simulation->broken().empty()) keep_apart(simulation->joints());
     const dynamics::StepCounts& counts = parallel.counts();
     middle += counts.middle, ahead += counts.approaches, missed += counts.missed;
@@ -87,8 +110,42 @@ class BothWays {
   }
   void place(std::uint32_t body, const dynamics::BodyState& state) {
     simulation->place(body, state);
-    parallel.arrays().start[body] = state;
-    wake_body(executor_, parallel.arrays(), body);
+    EXPECT_EQ(parallel.place(body, state), Status::kOk);
+  }
+  void change(std::uint32_t body, const dynamics::BodySettings& settings) {
+    simulation->change(body, settings);
+    EXPECT_EQ(parallel.change(body, settings), Status::kOk);
+  }
+  void set_force(std::uint32_t body, const dynamics::BodyForce& force) {
+    simulation->set_force(body, force);
+    EXPECT_EQ(parallel.set_force(body, force), Status::kOk);
+  }
+
+  void compare_touches(int number) {
+    std::vector<WorldTouch> rows;
+    std::vector<ObjectPair> pairs;
+    ASSERT_EQ(parallel.touching(rows), Status::kOk);
+    ASSERT_TRUE(same_rows<WorldTouch>(rows, simulation->touches().touching())) << number;
+    ASSERT_EQ(parallel.began(rows), Status::kOk);
+    ASSERT_TRUE(same_rows<WorldTouch>(rows, began)) << number << " " << rows.size() << " " << began.size();
+    ASSERT_EQ(parallel.ended(pairs), Status::kOk);
+    ASSERT_TRUE(same_rows<ObjectPair>(pairs, ended)) << number << " " << pairs.size() << " " << ended.size();
+  }
+
+  /// Keeps both states, and goes back to them.
+  struct State {
+    dynamics::SimulationState simulation;
+    dynamics::ParallelState<dynamics::HostExecutor> parallel;
+  };
+  void save(State& state) {
+    state.simulation = simulation->save();
+    EXPECT_EQ(parallel.save(state.parallel), Status::kOk);
+  }
+  void restore(const State& state) {
+    simulation->restore(state.simulation);
+    EXPECT_EQ(parallel.restore(state.parallel), Status::kOk);
+    keep_apart(simulation->joints());
+    began.clear(), ended.clear();
   }
 
   std::span<const dynamics::BodyState> states() const { return {parallel.arrays().start, parallel.bodies()}; }
@@ -104,9 +161,11 @@ class BothWays {
     ASSERT_EQ(parallel.joint_memory(memory), Status::kOk);
     ASSERT_EQ(memory.size(), simulation->joints().size());
     for (std::size_t i = 0; i < memory.size(); ++i) {
-      ASSERT_TRUE(same_bytes(memory[i], simulation->joint_memory()[i])) << "step " << number << " joint " << i;
+      ASSERT_TRUE(same_bytes(memory[i], simulation->joint_memory()[i]))
+          << "step " << number << " joint " << i;
       ASSERT_EQ(parallel.joints()[i].holds, simulation->joints()[i].holds) << number << " " << i;
-      ASSERT_EQ(parallel.arrays().joints.joints[i].holds, simulation->joints()[i].holds) << number << " " << i;
+      ASSERT_EQ(parallel.arrays().joints.joints[i].holds, simulation->joints()[i].holds)
+          << number << " " << i;
     }
     ASSERT_TRUE(std::ranges::equal(parallel.broken(), simulation->broken())) << number;
   }
@@ -127,6 +186,8 @@ class BothWays {
   std::unique_ptr<dynamics::Simulation> simulation;
   dynamics::ParallelSimulation<dynamics::HostExecutor, dynamics::HostQuestions> parallel;
   std::uint32_t middle = 0, ahead = 0, missed = 0, touching = 0;
+  std::vector<WorldTouch> began;  // in the call
+  std::vector<ObjectPair> ended;
 };
 
 }  // namespace tandem::test

@@ -13,7 +13,13 @@ using namespace dynamics;
 TEST(ParallelStep, IsTheStepOfASimulation) {
   const FallingBodies bodies(24);
   BothWays both(bodies, {.sleeping = false});
-  for (int step = 0; step < 240 && !HasFatalFailure(); ++step) both.step(step);
+  std::size_t most_bounced = 0;
+  for (int step = 0; step < 240 && !HasFatalFailure(); ++step) {
+    if (step % 40 == 0) both.begin_call();
+    both.step(step);
+    most_bounced = std::max(most_bounced, std::min(both.began.size(), both.ended.size()));
+  }
+  EXPECT_GT(most_bounced, 8u);
   EXPECT_GT(both.middle, 100u);
   EXPECT_GT(both.ahead, 100u);
   EXPECT_GT(both.touching, 1000u);
@@ -28,6 +34,112 @@ TEST(ParallelStep, SleepsAndWakesAsASimulationDoes) {
     for (std::uint32_t i = 0; i < both.parallel.bodies(); ++i) slept += both.simulation->sleeps(i) ? 1 : 0;
   }
   EXPECT_GT(slept, 100u);
+}
+
+// A platform that rises lifts boxes that sleep in the air, and a bar sweeps them off: bodies that contacts do
+// not move meet such as sleep, and pairs part for good within the call.
+TEST(ParallelStep, FollowsPairsThatKinematicBodiesMeet) {
+  FallingBodies many(1);
+  for (int i = 0; i < 10; ++i) {
+    BodyDescription& body = many.descriptions.emplace_back();
+    body.asset = 3, body.pose = shift(0.5 * (i % 5) - 1, 0.5 * (i / 5), 0.1 + (i % 2) * 0.21);
+  }
+  for (const bool rises : {false, true}) {
+    BodyDescription& body = many.descriptions.emplace_back();
+    body.asset = 3, body.filter.motion = Motion::kinematic;
+    body.pose = rises ? shift(0, 0, -1) : shift(-4, 0, 0.1);
+    body.velocity[rises ? 2 : 0] = rises ? 0.5 : 1;
+  }
+  BothWays both(many);
+  std::uint32_t slept = 0;
+  for (int step = 0; step < 400 && !HasFatalFailure(); ++step) {
+    both.step(step);
+    for (std::uint32_t i = 0; i < both.parallel.bodies(); ++i) slept += both.simulation->sleeps(i) ? 1 : 0;
+  }
+  EXPECT_GT(slept, 100u);
+  EXPECT_GT(both.ended.size(), 5u);
+}
+
+// Boxes sleep on a floor and beside each other, and callers change them, one after the other.
+TEST(ParallelStep, IsToldOfChangesAsASimulationIs) {
+  FallingBodies heap(1);
+  for (int i = 0; i < 8; ++i) {
+    BodyDescription& body = heap.descriptions.emplace_back();
+    body.asset = 3, body.pose = shift(1.1 * (i / 2) - 2, 0, 0.1 + 0.2 * (i % 2));
+  }
+  BodyDescription& held = heap.descriptions.emplace_back();
+  held.asset = 3, held.pose = shift(-2, 0, 0.5), held.filter.motion = Motion::fixed;
+  BothWays both(heap);
+  std::uint32_t slept = 0, woke = 0;
+  both.steps(720, [&](int step) {
+    const auto sleeping = [&] {
+      std::uint32_t count = 0;
+      for (std::uint32_t i = 0; i < both.parallel.bodies(); ++i) count += both.simulation->sleeps(i) ? 1 : 0;
+      return count;
+    };
+    if (step % 60 != 59) return;
+    const std::uint32_t before = sleeping(), body = 1 + step / 60 % 9;
+    slept += before;
+    BodySettings settings = both.simulation->bodies()[body];
+    BodyState state = both.simulation->states()[body];
+    if (step / 60 == 6) {
+      settings.material.friction = 0.1;
+      both.change(0, settings);  // the floor: all that lies on it wakes
+    } else if (step / 60 % 3 == 0) {
+      both.set_force(body, {{0.5, 0, 0}, {}});
+    } else if (step / 60 % 3 == 1) {
+      settings.gravity_scale = settings.gravity_scale == 1 ? 1.25 : 1;
+      both.change(body, settings);
+    } else {
+      state.position.z += 0.01;
+      both.place(body, state);
+    }
+    const std::uint32_t after = sleeping();
+    woke += before > after ? 1 : 0;
+  });
+  EXPECT_GT(slept, 30u);
+  EXPECT_GE(woke, 6u);
+}
+
+// What is not new wakes nobody.
+TEST(ParallelStep, SleepsOnWhereNothingChanges) {
+  FallingBodies one(1);
+  one.descriptions.emplace_back().asset = 3;
+  one.descriptions.back().pose = shift(0, 0, 0.1);
+  BothWays both(one);
+  both.steps(60, [](int) {});
+  ASSERT_TRUE(both.simulation->sleeps(1));
+  both.change(1, both.simulation->bodies()[1]);
+  both.set_force(1, {});
+  EXPECT_TRUE(both.simulation->sleeps(1));
+  EXPECT_NE(both.parallel.arrays().group[1], Sleep::kAwake);
+}
+
+// Going back gives the steps that followed, whatever happened meanwhile.
+TEST(ParallelStep, GoesBackToAState) {
+  const FallingBodies bodies(40, 7);
+  BothWays both(bodies, {}, 2);
+  both.set_force(5, {{0.2, 0, 0}, {}});
+  both.steps(50, [](int) {});
+  BothWays::State state;
+  both.save(state);
+  both.begin_call();
+  for (int run = 0; run < 2; ++run) {
+    both.steps(90, [&](int step) {
+      if (run > 0 || step != 20) return;
+      BodySettings settings = both.simulation->bodies()[3];
+      settings.gravity_scale = 3, settings.material.friction = 0;
+      both.change(3, settings);
+      both.change(0, settings);
+      both.set_force(4, {{0, 1, 0}, {}});
+      BodyState moved = both.simulation->states()[0];
+      moved.position.z -= 0.05;
+      both.place(0, moved);
+    });
+    both.restore(state);
+    both.compare_touches(run);
+  }
+  EXPECT_GT(both.touching, 1000u);
 }
 
 // Boxes that stand side by side, a hair apart, and the first is pushed: of what the others do in the step
@@ -53,8 +165,15 @@ TEST(ParallelStep, IsMadeAgainWhereRoomIsShort) {
     body.pose.translation[2] += 0.001 * (i % 7);
   }
   BothWays both(many, {}, 2);
-  for (int step = 0; step < 3 && !HasFatalFailure(); ++step) both.step(step);
+  ParallelState<HostExecutor> start;
+  ASSERT_EQ(both.parallel.save(start), Status::kOk);
+  both.steps(3, [](int) {});
   EXPECT_GT(both.parallel.counts().pairs, 8 * 700u);
+  // Going back to before there was room gives the same.
+  const std::vector<BodyState> states(both.states().begin(), both.states().end());
+  ASSERT_EQ(both.parallel.restore(start), Status::kOk);
+  for (int step = 0; step < 3; ++step) ASSERT_EQ(both.parallel.step(1.0 / 60), Status::kOk);
+  EXPECT_TRUE(same_rows<BodyState>(both.states(), states));
 }
 
 }  // namespace

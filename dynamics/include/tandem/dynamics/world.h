@@ -135,6 +135,10 @@ class World {
   /// step that was whole, and there are no contacts.
   Status step(double dt, std::uint32_t steps = 1);
 
+  /// Makes more steps, which began(), ended() and broken() take for steps of the last call of step(). Result:
+  /// as of step().
+  Status step_more(double dt, std::uint32_t steps = 1);
+
   /// The bodies as they are now. Valid until the next call.
   std::span<const BodyMotion> bodies() const;
 

@@ -45,11 +45,16 @@ class GpuWorld {
   /// after the last step that was whole.
   Status step(double dt, std::uint32_t steps = 1);
 
-  /// Copy from the GPU what World's functions of these names return; valid until the next call. touching:
-  /// only their bodies are known.
+  /// Makes more steps of the last call, see World::step_more(). Result: as of step().
+  Status step_more(double dt, std::uint32_t steps = 1);
+
+  /// Copy from the GPU what World's functions of these names return; valid until the next call. What began
+  /// and ended is followed on the GPU, and lists are made when they are asked for.
   Status bodies(std::span<const BodyMotion>& bodies);
   Status contacts(std::span<const WorldContact>& contacts);
-  Status touching(std::span<const ObjectPair>& touching);
+  Status touching(std::span<const WorldTouch>& touching);
+  Status began(std::span<const WorldTouch>& began);
+  Status ended(std::span<const ObjectPair>& ended);
 
   /// Returns the state of each body, in GPU memory, as it is after the last step; null without bodies. It
   /// stays where it is until set_bodies(). Who writes there calls wake() then.
@@ -66,6 +71,16 @@ class GpuWorld {
   /// Sets a force and a torque that act on a moving body from now on, see World.
   Status set_force(std::uint32_t body, const double (&force)[3], const double (&torque)[3]);
 
+  /// Gives a body another material, or lets another part of gravity act on it, see World.
+  Status set_material(std::uint32_t body, const Material& material);
+  Status set_gravity_scale(std::uint32_t body, double gravity_scale);
+
+  /// Keeps all that the next steps depend on, in GPU memory, and goes back to it: they have the same bytes
+  /// then. See World. States may outlive the world.
+  class State;
+  Status save(std::shared_ptr<const State>& state) const;
+  Status restore(const State& state);
+
   /// Returns the body's mass; 0 of one that contacts do not move.
   double mass_of(std::uint32_t body) const;
 
@@ -74,10 +89,12 @@ class GpuWorld {
 
   double time() const;          ///< seconds of all steps since set_bodies()
   std::uint64_t where() const;  ///< see World
-  std::size_t bytes() const;    ///< of GPU memory that bodies, pairs and contacts take
+  std::size_t bytes() const;    ///< of GPU memory held, but for assets and states
 
  private:
   struct Parts;
+  template <typename Change>
+  Status change(std::uint32_t body, const Change& change);
   Status fail(Status status, std::uint64_t where = 0) const;
   std::unique_ptr<Parts> parts_;
 };

@@ -283,13 +283,11 @@ Status World::remove_joint(std::uint32_t joint) {
 }
 
 Status World::set_motor(std::uint32_t joint, double speed, double most_effort) {
-  if (joint >= joints().size() || !joints()[joint].holds) return fail(Status::kBadJoint, joint);
-  JointDescription motor;
-  motor.kind = parts_->simulation->joints()[joint].kind;
-  motor.speed = speed, motor.most_effort = most_effort;
-  const Status status = dynamics::check(motor);
+  if (bodies().empty()) return fail(Status::kBadJoint, joint);
+  Simulation& simulation = *parts_->simulation;
+  const Status status = check_motor(simulation.joints(), joint, speed, most_effort);
   if (status != Status::kOk) return fail(status, joint);
-  parts_->simulation->set_motor(joint, speed, most_effort);
+  simulation.set_motor(joint, speed, most_effort);
   parts_->read();
   return fail(Status::kOk);
 }

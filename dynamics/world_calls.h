@@ -35,4 +35,14 @@ inline Status read_force(const BodyProperties& body, const BodyState& state, con
   return pull_on(body, state, {}, to).most() <= kFastest ? Status::kOk : Status::kOutOfRange;
 }
 
+/// Result: kOk where the joint holds and may have such a motor.
+inline Status check_motor(std::span<const Joint> joints, std::uint32_t joint, double speed,
+                          double most_effort) {
+  if (joint >= joints.size() || !joints[joint].holds) return Status::kBadJoint;
+  JointDescription motor;
+  motor.kind = joints[joint].kind;
+  motor.speed = speed, motor.most_effort = most_effort;
+  return check(motor);
+}
+
 }  // namespace tandem::dynamics

@@ -29,7 +29,7 @@ using GpuSimulation = ParallelSimulation<CudaExecutor, CudaQuestions>;
 class GpuWorld::State {
  public:
   std::shared_ptr<const char> of;  // Parts::placed of the bodies whose state it is
-  double time;
+  double time, dt;
   std::vector<BodyProperties> properties;
   ParallelState<CudaExecutor> simulation;
 };
@@ -47,10 +47,12 @@ struct GpuWorld::Parts {
   std::shared_ptr<const char> placed;  // of these bodies alone; null where there are none
   std::vector<BodyProperties> properties;
   GpuArray<std::uint32_t> group, mask, world;
-  GpuExcludedPairs excluded;
+  PairFilter filter;                   // on the GPU
+  std::vector<ObjectPair> kept_apart;  // by the caller
+  GpuExcludedPairs excluded;           // these, and those that joints keep from touching
   ParallelOptions options;
   bool has_contacts = false;  // those of the last step are there
-  double time = 0;
+  double time = 0, dt = 1;  // dt: of the last step
   std::uint64_t where = 0;
 
   // Copies from the GPU, for callers.
@@ -63,6 +65,9 @@ struct GpuWorld::Parts {
   std::vector<WorldContact> contacts;
   std::vector<WorldTouch> touching, began;
   std::vector<ObjectPair> ended;
+  std::vector<JointMemory> joint_memory;
+  std::vector<WorldJoint> joints;
+  std::vector<std::uint32_t> broken;  // in the last call
 
   Parts() = default;
   Parts(const Parts&) = delete;
@@ -75,9 +80,13 @@ struct GpuWorld::Parts {
   void clear() {
     simulation.reset(), placed.reset();
     properties.clear();
-    has_contacts = false, time = 0, where = 0;
+    broken.clear();
+    has_contacts = false, time = 0, dt = 1, where = 0;
   }
-  Status upload_filter(const WorldSetup& setup, std::span<const ObjectPair> excluded_pairs);
+  Status upload_filter(const WorldSetup& setup);
+  Status exclude(std::span<const Joint> joints);
+  Status take_broken();
+  Status read_states();
   Status read_contacts();
   Status read_state(std::uint32_t body, BodyState& state);
   template <typename Row, typename Get>
@@ -142,22 +151,23 @@ Status GpuWorld::set_assets(std::span<const AssetView> assets, cudaStream_t stre
 }
 
 Status GpuWorld::set_bodies(std::span<const BodyDescription> bodies, const WorldOptions& options,
-                            std::span<const ObjectPair> excluded) {
+                            std::span<const ObjectPair> excluded, std::span<const JointDescription> joints) {
   if (parts_ == nullptr) return Status::kOutOfMemory;
   Parts& parts = *parts_;
   parts.clear();
   try {
     WorldSetup setup;
     std::uint64_t blamed = 0;
-    Status status = set_up(parts.assets, bodies, options, {}, setup, blamed);
+    Status status = set_up(parts.assets, bodies, options, joints, setup, blamed);
     if (status == Status::kOk && options.continuous) status = Status::kBadOption;
     if (status != Status::kOk) return fail(status, blamed);
     parts.options = {setup.options.gravity, setup.options.solver, setup.options.sleep};
-    status = parts.upload_filter(setup, excluded);
+    parts.kept_apart.assign(excluded.begin(), excluded.end());
+    status = parts.upload_filter(setup);
     if (status != Status::kOk) return fail(status);
     parts.simulation.emplace(parts.executor, parts.questions);
-    status = parts.simulation->set_bodies({setup.properties, setup.states, parts.inner_radii, parts.boxes},
-                                          parts.options);
+    status = parts.simulation->set_bodies(
+        {setup.properties, setup.states, parts.inner_radii, parts.boxes, setup.joints}, parts.options);
     if (status != Status::kOk) {
       parts.clear();
       return fail(status);
@@ -171,23 +181,47 @@ Status GpuWorld::set_bodies(std::span<const BodyDescription> bodies, const World
   return Status::kOk;
 }
 
-Status GpuWorld::Parts::upload_filter(const WorldSetup& setup, std::span<const ObjectPair> excluded_pairs) {
-  ExcludedPairTable table;
-  Status status = table.set(excluded_pairs);
-  if (status == Status::kOk) status = excluded.upload(table.view(), executor.stream());
+Status GpuWorld::Parts::upload_filter(const WorldSetup& setup) {
+  Status status = Status::kOk;
   for (const auto& [from, to] :
        {std::pair(&setup.group, &group), {&setup.mask, &mask}, {&setup.world, &world}}) {
     if (status == Status::kOk) status = status_of(to->upload(*from, executor.stream()));
   }
   if (status == Status::kOk) status = executor.wait();
   const bool one_world = std::ranges::all_of(setup.world, [](std::uint32_t of) { return of == kEveryWorld; });
-  questions.set_filter(
-      {nullptr, group.data(), mask.data(), one_world ? nullptr : world.data(), excluded.view()});
-  return status;
+  filter = {nullptr, group.data(), mask.data(), one_world ? nullptr : world.data(), {}};
+  return status == Status::kOk ? exclude(setup.joints) : status;
+}
+
+// Lets questions look past pairs that are excluded, or joined and may not touch. Throws std::bad_alloc.
+Status GpuWorld::Parts::exclude(std::span<const Joint> joined) {
+  ExcludedPairTable table;
+  Status status = exclude_joined(kept_apart, joined, table);
+  if (status == Status::kOk) status = excluded.upload(table.view(), executor.stream());
+  if (status == Status::kOk) status = executor.wait();
+  if (status != Status::kOk) return status;
+  filter.excluded = excluded.view();
+  questions.set_filter(filter);
+  if (simulation.has_value()) simulation->questions_change();
+  return Status::kOk;
+}
+
+// Adds the joints that broke in a step to those of the call.
+Status GpuWorld::Parts::take_broken() {
+  const auto of_step = simulation->broken();
+  if (of_step.empty()) return Status::kOk;
+  try {
+    broken.insert(broken.end(), of_step.begin(), of_step.end());
+    std::ranges::sort(broken);
+    return exclude(simulation->joints());
+  } catch (const std::bad_alloc&) {
+    return Status::kOutOfMemory;
+  }
 }
 
 Status GpuWorld::step(double dt, std::uint32_t steps) {
-  if (parts_ != nullptr && is_duration(dt) && parts_->has_bodies()) parts_->simulation->forget_call();
+  if (parts_ != nullptr && is_duration(dt) && parts_->has_bodies())
+    parts_->simulation->forget_call(), parts_->broken.clear();
   return step_more(dt, steps);
 }
 
@@ -196,9 +230,11 @@ Status GpuWorld::step_more(double dt, std::uint32_t steps) {
   if (!is_duration(dt)) return fail(Status::kBadDuration);
   if (!parts_->has_bodies()) return fail(Status::kOk);
   Parts& parts = *parts_;
+  if (steps > 0) parts.dt = dt;
   for (std::uint32_t i = 0; i < steps; ++i) {
-    const Status status = parts.simulation->step(dt);
+    Status status = parts.simulation->step(dt);
     parts.has_contacts = status == Status::kOk;
+    if (status == Status::kOk) status = parts.take_broken();
     if (status != Status::kOk) {
       const bool of_body = status == Status::kOutOfRange && parts.simulation->bad_body() != kNoIndex;
       return fail(status, of_body ? parts.simulation->bad_body() : parts.questions.where());
@@ -215,7 +251,7 @@ Status GpuWorld::bodies(std::span<const BodyMotion>& bodies) {
   Parts& parts = *parts_;
   try {
     const StepArrays a = parts.simulation->arrays();
-    Status status = read(parts.executor, a.start, a.bodies, parts.states);
+    Status status = parts.read_states();
     if (status == Status::kOk) status = read(parts.executor, a.group, a.bodies, parts.groups);
     if (status != Status::kOk) return fail(status);
     parts.bodies.resize(a.bodies);
@@ -227,6 +263,11 @@ Status GpuWorld::bodies(std::span<const BodyMotion>& bodies) {
   }
   bodies = parts.bodies;
   return Status::kOk;
+}
+
+Status GpuWorld::Parts::read_states() {
+  const StepArrays a = simulation->arrays();
+  return read(executor, a.start, a.bodies, states);
 }
 
 // The records of the last step are those before the next one.
@@ -288,6 +329,77 @@ Status GpuWorld::ended(std::span<const ObjectPair>& ended) {
   ended = {};
   if (parts_ == nullptr) return Status::kOutOfMemory;
   return fail(parts_->list(&GpuSimulation::ended, parts_->ended, ended));
+}
+
+Status GpuWorld::joints(std::span<const WorldJoint>& joints) {
+  joints = {};
+  if (parts_ == nullptr) return Status::kOutOfMemory;
+  if (!parts_->has_bodies()) return fail(Status::kOk);
+  Parts& parts = *parts_;
+  const auto all = parts.simulation->joints();
+  if (all.empty()) return fail(Status::kOk);
+  try {
+    Status status = parts.simulation->joint_memory(parts.joint_memory);
+    if (status == Status::kOk) status = parts.read_states();
+    if (status != Status::kOk) return fail(status);
+    parts.joints.assign(all.size(), WorldJoint{});
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      if (!all[i].is_gone()) parts.joints[i] = joint_of(all[i], parts.joint_memory[i], parts.states, parts.dt);
+    }
+  } catch (const std::bad_alloc&) {
+    return fail(Status::kOutOfMemory);
+  }
+  joints = parts.joints;
+  return fail(Status::kOk);
+}
+
+Status GpuWorld::broken(std::span<const std::uint32_t>& broken) {
+  broken = {};
+  if (parts_ == nullptr) return Status::kOutOfMemory;
+  broken = parts_->broken;
+  return fail(Status::kOk);
+}
+
+Status GpuWorld::add_joint(const JointDescription& description, std::uint32_t& joint) {
+  if (body_count() == 0) return fail(Status::kUnknownInstance);
+  Parts& parts = *parts_;
+  if (const Status status = check(description, parts.properties); status != Status::kOk) return fail(status);
+  try {
+    Status status = parts.read_states();
+    std::uint32_t place = 0;
+    if (status == Status::kOk)
+      status = parts.simulation->add_joint(make_joint(description, parts.states), parts.properties,
+                                           parts.states, place);
+    if (status != Status::kOk) return fail(status);
+    status = parts.exclude(parts.simulation->joints());
+    if (status != Status::kOk) {
+      static_cast<void>(parts.simulation->remove_joint(place));
+      return fail(status);
+    }
+    joint = place;
+  } catch (const std::bad_alloc&) {
+    return fail(Status::kOutOfMemory);
+  }
+  return fail(parts_->executor.wait());
+}
+
+Status GpuWorld::remove_joint(std::uint32_t joint) {
+  const auto all = body_count() > 0 ? parts_->simulation->joints() : std::span<const Joint>();
+  if (joint >= all.size() || all[joint].is_gone()) return fail(Status::kBadJoint, joint);
+  try {
+    Status status = parts_->simulation->remove_joint(joint);
+    if (status == Status::kOk) status = parts_->exclude(parts_->simulation->joints());
+    return fail(status);
+  } catch (const std::bad_alloc&) {
+    return fail(Status::kOutOfMemory);
+  }
+}
+
+Status GpuWorld::set_motor(std::uint32_t joint, double speed, double most_effort) {
+  const auto all = body_count() > 0 ? parts_->simulation->joints() : std::span<const Joint>();
+  const Status status = check_motor(all, joint, speed, most_effort);
+  return status == Status::kOk ? fail(parts_->simulation->set_motor(joint, speed, most_effort))
+                               : fail(status, joint);
 }
 
 GpuBodyState* GpuWorld::states() const {
@@ -361,7 +473,7 @@ Status GpuWorld::save(std::shared_ptr<const State>& state) const {
   if (parts_ == nullptr) return Status::kOutOfMemory;
   try {
     auto kept = std::make_shared<State>();
-    kept->of = parts_->placed, kept->time = parts_->time;
+    kept->of = parts_->placed, kept->time = parts_->time, kept->dt = parts_->dt;
     if (parts_->has_bodies()) {
       kept->properties = parts_->properties;
       const Status status = parts_->simulation->save(kept->simulation);
@@ -382,8 +494,13 @@ Status GpuWorld::restore(const State& state) {
   const Status status = parts_->simulation->restore(state.simulation);
   if (status != Status::kOk) return fail(status);
   std::ranges::copy(state.properties, parts_->properties.begin());
-  parts_->time = state.time;
-  return fail(Status::kOk);
+  parts_->time = state.time, parts_->dt = state.dt;
+  parts_->broken.clear();
+  try {
+    return fail(parts_->exclude(parts_->simulation->joints()));
+  } catch (const std::bad_alloc&) {
+    return fail(Status::kOutOfMemory);
+  }
 }
 
 double GpuWorld::mass_of(std::uint32_t body) const {

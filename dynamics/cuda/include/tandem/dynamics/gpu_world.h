@@ -17,11 +17,11 @@ struct GpuBodyState {
   double velocity[3], angular_velocity[3];
 };
 
-/// Rigid bodies of meshes that move on a GPU: those of World, by the same rules, but that all contacts are
-/// soft and there are no joints and no continuous motion. Contacts are found, solved and remembered in GPU
-/// memory; the CPU reads a few numbers once a step. Throws nothing. Movable, not copyable. One call at a
-/// time, and all with the GPU that was the current one at set_assets(). The same calls give the same bytes on
-/// GPUs of one kind; docs/dynamics.md says how they differ from World's.
+/// Rigid bodies of meshes that move on a GPU: those of World, by the same rules, but that all contacts and
+/// joints are soft and there is no continuous motion. Contacts are found, solved and remembered in GPU memory;
+/// the CPU reads a few numbers once a step. Throws nothing. Movable, not copyable. One call at a time, and all
+/// with the GPU that was the current one at set_assets(). The same calls give the same bytes on GPUs of one
+/// kind; docs/dynamics.md says how they differ from World's.
 ///
 /// All functions may also return kNoGpu, kDriverTooOld, kGpuNotSupported, kOutOfGpuMemory or kCudaFailed.
 class GpuWorld {
@@ -39,7 +39,7 @@ class GpuWorld {
   /// Places all bodies anew, at time 0. Result: as of World::set_bodies(), and kBadOption where `continuous`
   /// is set. WorldOptions::threads is not looked at.
   Status set_bodies(std::span<const BodyDescription> bodies, const WorldOptions& options = {},
-                    std::span<const ObjectPair> excluded = {});
+                    std::span<const ObjectPair> excluded = {}, std::span<const JointDescription> joints = {});
 
   /// Makes steps of dt seconds, and waits for them. Result: as of World::step(). After an error bodies are as
   /// after the last step that was whole.
@@ -55,6 +55,13 @@ class GpuWorld {
   Status touching(std::span<const WorldTouch>& touching);
   Status began(std::span<const WorldTouch>& began);
   Status ended(std::span<const ObjectPair>& ended);
+  Status joints(std::span<const WorldJoint>& joints);
+  Status broken(std::span<const std::uint32_t>& broken);
+
+  /// Join bodies, part them and drive them, see World.
+  Status add_joint(const JointDescription& description, std::uint32_t& joint);
+  Status remove_joint(std::uint32_t joint);
+  Status set_motor(std::uint32_t joint, double speed, double most_effort);
 
   /// Returns the state of each body, in GPU memory, as it is after the last step; null without bodies. It
   /// stays where it is until set_bodies(). Who writes there calls wake() then.

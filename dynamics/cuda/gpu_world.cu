@@ -52,7 +52,7 @@ struct GpuWorld::Parts {
   GpuExcludedPairs excluded;           // these, and those that joints keep from touching
   ParallelOptions options;
   bool has_contacts = false;  // those of the last step are there
-  double time = 0, dt = 1;  // dt: of the last step
+  double time = 0, dt = 1;    // dt: of the last step
   std::uint64_t where = 0;
 
   // Copies from the GPU, for callers.
@@ -344,7 +344,8 @@ Status GpuWorld::joints(std::span<const WorldJoint>& joints) {
     if (status != Status::kOk) return fail(status);
     parts.joints.assign(all.size(), WorldJoint{});
     for (std::size_t i = 0; i < all.size(); ++i) {
-      if (!all[i].is_gone()) parts.joints[i] = joint_of(all[i], parts.joint_memory[i], parts.states, parts.dt);
+      if (!all[i].is_gone())
+        parts.joints[i] = joint_of(all[i], parts.joint_memory[i], parts.states, parts.dt);
     }
   } catch (const std::bad_alloc&) {
     return fail(Status::kOutOfMemory);

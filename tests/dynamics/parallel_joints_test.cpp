@@ -1,61 +1,25 @@
 #include <gtest/gtest.h>
 
 #include "dynamics/both_ways.h"
-#include "dynamics/falling_bodies.h"
+#include "dynamics/joined_boxes.h"
 
 namespace tandem::test {
 namespace {
 
 using namespace dynamics;
 
-// A floor, and boxes of 40 x 30 x 20 cm.
-struct JoinedBoxes : FallingBodies {
-  JoinedBoxes() : FallingBodies(1) {}
-
-  std::uint32_t add(double x, double y, double z) {
-    BodyDescription& body = descriptions.emplace_back();
-    body.asset = 3, body.pose = shift(x, y, z);
-    return static_cast<std::uint32_t>(descriptions.size() - 1);
-  }
-  JointDescription& join(JointKind kind, std::uint32_t a, std::uint32_t b, const double (&anchor)[3]) {
-    JointDescription& joint = joints.emplace_back();
-    joint.kind = kind, joint.a = a, joint.b = b;
-    std::ranges::copy(anchor, joint.anchor), std::ranges::copy(anchor, joint.anchor_b);
-    return joint;
-  }
-  BothWays begin(const WorldOptions& options = {}, std::uint32_t threads = 1) const {
-    return BothWays(*this, options, threads, joints);
-  }
-
-  std::vector<JointDescription> joints;
-};
+BothWays begin(const JoinedBoxes& boxes, const WorldOptions& options = {}, std::uint32_t threads = 1) {
+  return BothWays(boxes, options, threads, boxes.joints);
+}
 
 void steps(BothWays& both, int count) {
   for (int step = 0; step < count && !testing::Test::HasFatalFailure(); ++step) both.step(step);
 }
 
-// Pairs of boxes that fall in a heap, of any kind of joint, some with limits, motors and bounds that break.
-JoinedBoxes heap_of_pairs() {
-  JoinedBoxes heap;
-  for (int i = 0; i < 15; ++i) {
-    const double x = 0.5 * (i % 3), z = 0.4 + 0.5 * (i / 3), at[3] = {x, 0.17, z};
-    const std::uint32_t a = heap.add(x, 0, z), b = heap.add(x, 0.34, z);
-    JointDescription& joint = heap.join(static_cast<JointKind>(i % 5), a, b, at);
-    if (joint.kind == JointKind::distance) joint.anchor[1] = 0, joint.anchor_b[1] = 0.34, joint.most = 0.4;
-    if (i % 2 == 0 && (joint.kind == JointKind::hinge || joint.kind == JointKind::slider))
-      joint.least = -0.05, joint.most = 0.1;
-    if (i % 3 == 0 && (joint.kind == JointKind::hinge || joint.kind == JointKind::slider))
-      joint.speed = 2, joint.most_effort = 20;
-    if (i % 4 == 0) joint.breaking_force = 2000;
-    joint.may_touch = i % 2 == 1;
-  }
-  return heap;
-}
-
 TEST(ParallelJoints, AreThoseOfASimulationInAHeap) {
   const JoinedBoxes heap = heap_of_pairs();
   for (const std::uint32_t threads : {1u, 3u}) {
-    BothWays both = heap.begin({.sleeping = false}, threads);
+    BothWays both = begin(heap, {.sleeping = false}, threads);
     steps(both, 150);
     EXPECT_GT(both.touching, 1000u);
     std::size_t held = 0;
@@ -78,7 +42,7 @@ TEST(ParallelJoints, HoldBodiesThatTouchNothing) {
       joint.anchor_b[0] += 0.1;
       if (kind == JointKind::slider) joint.least = -0.1, joint.most = 0.1;
     }
-    BothWays both = boxes.begin({.sleeping = false});
+    BothWays both = begin(boxes, {.sleeping = false});
     steps(both, 60);
     EXPECT_EQ(both.touching, 0u);
     const double fallen = 3 - both.states()[3].position.z;
@@ -94,7 +58,7 @@ TEST(ParallelJoints, MakeAChainThatFallsOnTheFloor) {
     if (i > 0) chain.join(JointKind::ball, link - 1, link, {0.42 * i - 0.21, 0, 1.5});
   }
   chain.join(JointKind::ball, kNoIndex, 1, {-0.2, 0, 1.5});
-  BothWays both = chain.begin({.sleeping = false}, 2);
+  BothWays both = begin(chain, {.sleeping = false}, 2);
   steps(both, 120);
   EXPECT_GT(both.touching, 100u);
 }
@@ -108,7 +72,7 @@ TEST(ParallelJoints, ActOnKinematicBodiesAndByMotors) {
   boxes.join(JointKind::hinge, carrier, load, {0, 0, 1.85}).axis[0] = 1;
   JointDescription& motor = boxes.join(JointKind::hinge, kNoIndex, bar, {2, 0, 1});
   motor.speed = 3, motor.most_effort = 100, motor.least = -0.5, motor.most = 0.8;
-  BothWays both = boxes.begin();
+  BothWays both = begin(boxes);
   steps(both, 60);
   EXPECT_NEAR(both.simulation->joint_memory()[1].position, 0.8, 0.01);
   both.set_motor(1, -2, 80);
@@ -121,7 +85,7 @@ TEST(ParallelJoints, BreakAndLetTheirBodiesTouch) {
   const std::uint32_t upper = boxes.add(0, 0, 0.30), lower = boxes.add(0, 0, 0.1);
   JointDescription& joint = boxes.join(JointKind::fixed, lower, upper, {0, 0, 0.2});
   joint.breaking_force = 100;
-  BothWays both = boxes.begin();
+  BothWays both = begin(boxes);
   EXPECT_FALSE(both.simulation->joints()[0].may_touch);
   std::size_t broken = 0;
   for (int step = 0; step < 60 && !HasFatalFailure(); ++step) {
@@ -142,7 +106,7 @@ TEST(ParallelJoints, SleepAndWakeTogether) {
   const std::uint32_t turned = boxes.add(-3, 2, 2);
   JointDescription& motor = boxes.join(JointKind::hinge, kNoIndex, turned, {-3, 2, 2});
   motor.most_effort = 10;
-  BothWays both = boxes.begin();
+  BothWays both = begin(boxes);
   steps(both, 60);
   ASSERT_EQ(both.sleeping(), 6u);
   // A motor keeps its body awake, and no other.
@@ -178,7 +142,7 @@ TEST(ParallelJoints, WakeABodyThatIsJoinedToOneAwake) {
   const std::uint32_t a = boxes.add(0, 0, 0.1), b = boxes.add(0.5, 0, 0.1);
   const std::uint32_t mover = boxes.add(2, 0, 2);
   boxes.descriptions[mover].filter.motion = Motion::kinematic;
-  BothWays both = boxes.begin();
+  BothWays both = begin(boxes);
   steps(both, 60);
   ASSERT_EQ(both.sleeping(), 2u);
   both.add_joint({.kind = JointKind::ball, .a = a, .b = b, .anchor = {0.25, 0, 0.1}});
@@ -193,7 +157,7 @@ TEST(ParallelJoints, KeepJoinedBodiesFromTouchingUnlessTheyMay) {
     const std::uint32_t a = boxes.add(0, 0, 0.1), b = boxes.add(0.05, 0.02, 0.31);
     boxes.join(JointKind::distance, a, b, {0, 0, 0.1}).may_touch = may_touch;
     boxes.joints[0].anchor_b[2] = 0.31, boxes.joints[0].least = 0, boxes.joints[0].most = 1;
-    BothWays both = boxes.begin();
+    BothWays both = begin(boxes);
     steps(both, 60);
     EXPECT_EQ(both.states()[b].position.z > 0.25, may_touch);
     // What was remembered of a pair goes where a joint keeps it from touching.
@@ -205,7 +169,7 @@ TEST(ParallelJoints, KeepJoinedBodiesFromTouchingUnlessTheyMay) {
 // Going back brings joints back that broke, were added, removed or driven otherwise meanwhile.
 TEST(ParallelJoints, GoBackToAState) {
   const JoinedBoxes heap = heap_of_pairs();
-  BothWays both = heap.begin();
+  BothWays both = begin(heap);
   steps(both, 10);
   BothWays::State state;
   both.save(state);
@@ -232,7 +196,7 @@ TEST(ParallelJoints, MayBeManyAtABody) {
     const std::uint32_t tip = star.add(2 * std::cos(i * 0.5), 2 * std::sin(i * 0.5), 3 + 0.3 * i);
     star.join(JointKind::ball, hub, tip, {0, 0, 3});
   }
-  BothWays both = star.begin({.sleeping = false}, 3);
+  BothWays both = begin(star, {.sleeping = false}, 3);
   steps(both, 3);
 }
 

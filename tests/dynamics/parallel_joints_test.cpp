@@ -63,6 +63,29 @@ TEST(ParallelJoints, MakeAChainThatFallsOnTheFloor) {
   EXPECT_GT(both.touching, 100u);
 }
 
+// Soft joints give way to a load that is 1,000 times as heavy as a link, by no more than docs/joints.md says.
+TEST(ParallelJoints, HoldALoad) {
+  for (const double load : {1.0, 1000.0}) {
+    JoinedBoxes chain;
+    for (int i = 0; i < 20; ++i) {
+      const std::uint32_t link = chain.add(0, 0, 6 - 0.2 * i);
+      chain.descriptions[link].filter.mask = 0;
+      chain.join(JointKind::ball, i > 0 ? link - 1 : kNoIndex, link, {0, 0, 6.1 - 0.2 * i});
+    }
+    chain.descriptions.back().density = load * 1000;
+    BothWays both = begin(chain, {.sleeping = false});
+    double apart = 0;
+    for (int step = 0; step < 300 && !HasFatalFailure(); ++step) {
+      both.step(step);
+      for (const Joint& joint : both.simulation->joints()) {
+        const BodyState a = state_of(joint.a, both.states()), b = state_of(joint.b, both.states());
+        apart = std::max(apart, norm(into_world(a, joint.anchor_a) - into_world(b, joint.anchor_b)));
+      }
+    }
+    EXPECT_LT(apart, load > 1 ? 0.02 : 4e-4);
+  }
+}
+
 // A body that kinematic ones carry, and a bar that a motor turns between limits.
 TEST(ParallelJoints, ActOnKinematicBodiesAndByMotors) {
   JoinedBoxes boxes;
@@ -164,6 +187,22 @@ TEST(ParallelJoints, KeepJoinedBodiesFromTouchingUnlessTheyMay) {
     if (may_touch) both.add_joint({.kind = JointKind::ball, .a = b, .b = a, .anchor = {0, 0, 0.3}});
     steps(both, 60);
   }
+}
+
+// A plate that so many boxes touch has as many colours, each with groups of its own, and there is too little
+// room for those at first.
+TEST(ParallelJoints, AreNotSolvedWhereRoomIsShort) {
+  JoinedBoxes boxes;
+  const std::uint32_t plate = boxes.add(0, 0, 0.2);
+  boxes.descriptions[plate].asset = 0;
+  for (int i = 0; i < 150; ++i) {
+    const double x = 0.5 * (i % 15) - 3, y = 0.4 * (i / 15) - 2;
+    const std::uint32_t box = boxes.add(x, y, 0.5);
+    if (i % 15 > 0) boxes.join(JointKind::ball, box - 1, box, {x - 0.25, y, 0.5});
+  }
+  BothWays both = begin(boxes, {.sleeping = false}, 2);
+  steps(both, 3);
+  EXPECT_GT(both.touching, 3 * 150u);
 }
 
 // Going back brings joints back that broke, were added, removed or driven otherwise meanwhile.

@@ -49,12 +49,19 @@ TANDEM_HD inline ContactPoint point_of(const ObjectPair& pair, const ManifoldPoi
 // A body as it stands when the step begins, and how far it may go.
 TANDEM_HD inline void place_body(const StepArrays& a, std::uint32_t i) {
   const BodyProperties& body = a.properties[i];
-  a.pulls[i] = pull_on(body, a.start[i], a.gravity, a.forces != nullptr ? a.forces[i] : BodyForce{});
-  a.idle[i] = a.acting[i].motion == Motion::fixed && a.placed[i] == 0 ? 1 : 0;
-  a.motion[i] = a.idle[i] != 0 ? Motion::fixed : Motion::moving;
   a.pose[i] = pose_of(body, a.start[i]).pose;
+  if (!is_usable(a.start[i]) || !is_rigid(a.pose[i])) {
+    // Such a step is not made. Questions do not see the body, nor do pairs.
+    atomic_least(a.counts->bad_start, i);
+    a.idle[i] = kUnusable, a.motion[i] = Motion::fixed, a.pose[i] = kIdentityPose;
+    a.pulls[i] = {}, a.ways[i] = {};
+    return;
+  }
+  a.pulls[i] = pull_on(body, a.start[i], a.gravity, a.forces != nullptr ? a.forces[i] : BodyForce{});
+  a.idle[i] = a.acting[i].motion == Motion::fixed && a.placed[i] == 0 ? kIdle : kNotIdle;
+  a.motion[i] = a.idle[i] != kNotIdle ? Motion::fixed : Motion::moving;
   a.ways[i] = way_of(body, a.before[i], a.start[i]);
-  if (a.idle[i] != 0) return;
+  if (a.idle[i] != kNotIdle) return;
   const BodiesAhead of = a.ahead();
   LargestReach& reach = a.counts->reach;
   atomic_most(reach.way, way_ahead(of, i));
@@ -66,6 +73,8 @@ TANDEM_HD inline void place_body(const StepArrays& a, std::uint32_t i) {
 TANDEM_HD inline void plan_pair(const StepArrays& a, std::uint32_t at, const ObjectPair& pair, bool is_near,
                                 std::uint32_t before) {
   const BodiesAhead of = a.ahead();
+  const bool can_begin = a.idle[pair.a] != kUnusable && a.idle[pair.b] != kUnusable;
+  is_near = is_near && can_begin;
   const PairRecord* const old = before != kNoIndex ? &a.records_before[before] : nullptr;
   PairRecord& record = a.records[at];
   PairPlan& plan = a.plans[at];
@@ -76,7 +85,7 @@ TANDEM_HD inline void plan_pair(const StepArrays& a, std::uint32_t at, const Obj
     record.apart = old->apart - way_between(a.ways[pair.a], a.ways[pair.b]) * (1 + 1e-9);
   plan = {};
   plan.before = before;
-  plan.is_idle = of.is_idle(pair.a) && of.is_idle(pair.b);
+  plan.is_idle = !can_begin || (of.is_idle(pair.a) && of.is_idle(pair.b));
   if (!is_near) return;
   record.apart = std::max(record.apart, least_distance(of, pair));
   const PairReach reach = reach_of(of, pair, record.apart);

@@ -78,7 +78,8 @@ struct PairStep {
     to.once([of] TANDEM_HD() {
       const std::uint32_t before = of.counts->records_before;
       *of.counts = {};
-      of.counts->records_before = before, of.counts->bad_body = kNoIndex;
+      of.counts->records_before = before;
+      of.counts->bad_start = of.counts->bad_body = kNoIndex;
     });
     to.for_each(nullptr, a.bodies, [of] TANDEM_HD(std::uint32_t i) { pair_step_detail::place_body(of, i); });
   }

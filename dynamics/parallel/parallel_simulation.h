@@ -226,7 +226,7 @@ class ParallelSimulation {
   void questions_change() { ++generation_; }
 
   std::uint32_t bodies() const { return bodies_; }
-  std::uint32_t bad_body() const { return read_.bad_body; }
+  std::uint32_t bad_body() const { return std::min(read_.bad_start, read_.bad_body); }
   const StepCounts& counts() const { return read_; }  ///< of the last step
 
   /// The arrays of the last step, whose results are those of the step before now.
@@ -321,6 +321,7 @@ class ParallelSimulation {
   Status read(bool& whole) {
     Status status = to_.wait();
     bool grew = false;
+    if (status == Status::kOk && read_.bad_start != kNoIndex) status = Status::kOutOfRange;
     if (status == Status::kOk) status = ask_.make_room(grew);
     const double needed = read_.reach.farthest(0.5 * options_.solver.slop);
     if (needed > within_) within_ = 1.5 * needed, grew = true;

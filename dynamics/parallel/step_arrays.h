@@ -48,9 +48,16 @@ struct StepCounts {
   std::uint32_t middle, asked, apart, approaches, surprised, missed;  ///< pairs, but for approaches
   std::uint32_t found, remembered, touching;  ///< contacts found, room for those remembered, pairs that push
   std::uint32_t broken;                       ///< joints that break at the end of the step
-  std::uint32_t bad_body;                     ///< the first whose state is not usable, or kNoIndex
+  std::uint32_t bad_start, bad_body;          ///< the first whose state is not usable, or kNoIndex
   std::uint32_t listed;                       ///< pairs, between steps
   LargestReach reach;
+};
+
+/// Says whether the step has to look at a body.
+enum Idle : std::uint8_t {
+  kNotIdle,
+  kIdle,      ///< contacts do not move it, and it was not placed
+  kUnusable,  ///< no step can begin with its state
 };
 
 /// All arrays of a step.
@@ -63,7 +70,7 @@ struct StepArrays {
   Pull* pulls;
   const BodyForce* forces;  ///< null: there are none
   std::uint8_t* placed;     ///< fixed bodies that were placed since the last step
-  std::uint8_t* idle;
+  std::uint8_t* idle;       ///< see Idle
   std::uint32_t* asset;
   Pose* pose;
   Motion* motion;              ///< of the filter of pairs

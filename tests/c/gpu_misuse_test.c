@@ -179,7 +179,9 @@ static void test_a_world(tandem_asset* cube) {
 
   const tandem_body_motion* bodies = (const tandem_body_motion*)&body;
   const tandem_world_contact* contacts = NULL;
-  const tandem_object_pair* touching = NULL;
+  const tandem_world_touch* touching = NULL;
+  const tandem_object_pair* ended = NULL;
+  tandem_gpu_world_state* state = NULL;
   const double vector[] = {0, 0, 0};
   const tandem_body_motion motion = {.pose = body.pose};
   size_t count = 7;
@@ -188,10 +190,22 @@ static void test_a_world(tandem_asset* cube) {
   CHECK_STATUS(tandem_gpu_world_bodies(world, NULL, &count), TANDEM_NULL_ARGUMENT);
   CHECK_STATUS(tandem_gpu_world_contacts(world, &contacts, NULL), TANDEM_OK);
   CHECK_STATUS(tandem_gpu_world_touching(world, &touching, NULL), TANDEM_OK);
+  CHECK_STATUS(tandem_gpu_world_began(world, &touching, NULL), TANDEM_OK);
+  CHECK_STATUS(tandem_gpu_world_ended(world, &ended, NULL), TANDEM_OK);
+  CHECK(touching == NULL && ended == NULL);
   count = 7;
   CHECK(tandem_gpu_world_states(world, &count) == NULL && count == 0);
   CHECK_STATUS(tandem_gpu_world_step(world, 0, 1), TANDEM_BAD_DURATION);
   CHECK_STATUS(tandem_gpu_world_step(world, 1, 1), TANDEM_OK);
+  CHECK_STATUS(tandem_gpu_world_step_more(world, 0, 1), TANDEM_BAD_DURATION);
+  CHECK_STATUS(tandem_gpu_world_step_more(world, 1, 1), TANDEM_OK);
+  CHECK_STATUS(tandem_gpu_world_save(world, NULL), TANDEM_NULL_ARGUMENT);
+  CHECK_STATUS(tandem_gpu_world_save(world, &state), TANDEM_OK);
+  CHECK_STATUS(tandem_gpu_world_restore(world, NULL), TANDEM_NULL_ARGUMENT);
+  CHECK_STATUS(tandem_gpu_world_restore(world, state), TANDEM_OK);
+  tandem_gpu_world_state_destroy(state);
+  CHECK_STATUS(tandem_gpu_world_set_material(world, 2, 0, 0, 0), TANDEM_UNKNOWN_INSTANCE);
+  CHECK_STATUS(tandem_gpu_world_set_gravity_scale(world, 2, 0), TANDEM_UNKNOWN_INSTANCE);
   CHECK_STATUS(tandem_gpu_world_wake(world), TANDEM_OK);
   CHECK_STATUS(tandem_gpu_world_push(world, 3, vector, vector), TANDEM_UNKNOWN_INSTANCE);
   CHECK(tandem_gpu_world_where(world) == 3);
@@ -205,11 +219,13 @@ static void test_a_world(tandem_asset* cube) {
   CHECK_STATUS(tandem_gpu_world_set_assets(NULL, list, 1, NULL), TANDEM_NULL_ARGUMENT);
   CHECK_STATUS(tandem_gpu_world_set_bodies(NULL, &body, 1, NULL, NULL), TANDEM_NULL_ARGUMENT);
   CHECK_STATUS(tandem_gpu_world_step(NULL, 1, 1), TANDEM_NULL_ARGUMENT);
+  CHECK_STATUS(tandem_gpu_world_step_more(NULL, 1, 1), TANDEM_NULL_ARGUMENT);
+  CHECK_STATUS(tandem_gpu_world_restore(NULL, NULL), TANDEM_NULL_ARGUMENT);
   CHECK_STATUS(tandem_gpu_world_bodies(NULL, &bodies, &count), TANDEM_NULL_ARGUMENT);
   CHECK_STATUS(tandem_gpu_world_wake(NULL), TANDEM_NULL_ARGUMENT);
   CHECK(tandem_gpu_world_states(NULL, &count) == NULL && count == 0);
   CHECK(tandem_gpu_world_time(NULL) == 0 && tandem_gpu_world_mass(NULL, 0) == 0 &&
-        tandem_gpu_world_where(NULL) == 0);
+        tandem_gpu_world_where(NULL) == 0 && tandem_gpu_world_bytes(NULL) == 0);
   tandem_gpu_world_destroy(NULL);
 }
 

@@ -79,7 +79,8 @@ static void test_a_fall_is_that_of_the_cpu(void) {
 static void test_rest(void) {
   tandem_gpu_world* world = world_of_boxes(NULL);
   size_t count = 7;
-  const tandem_object_pair* touching = NULL;
+  const tandem_world_touch *touching = NULL, *began = NULL;
+  const tandem_object_pair* ended = (const tandem_object_pair*)&count;
   const tandem_world_contact* contacts = (const tandem_world_contact*)&count;
   CHECK_STATUS(tandem_gpu_world_contacts(world, &contacts, &count), TANDEM_OK);
   CHECK(contacts == NULL && count == 0);
@@ -89,7 +90,17 @@ static void test_rest(void) {
   for (size_t i = 0; i < count; ++i)
     CHECK(contacts[i].a < contacts[i].b && contacts[i].b < kBodies && contacts[i].normal[2] > 0.9);
   CHECK_STATUS(tandem_gpu_world_touching(world, &touching, &count), TANDEM_OK);
-  CHECK(count > 0 && touching[0].a == 0 && touching[0].b == 1);
+  CHECK(count > 0 && touching[0].a == 0 && touching[0].b == 1 && touching[0].impulse > 0);
+  CHECK_STATUS(tandem_gpu_world_began(world, &began, &count), TANDEM_OK);
+  CHECK(count > 0 && began[0].a == 0 && began[0].b == 1 && began[0].speed > 0.1);
+  CHECK_STATUS(tandem_gpu_world_step_more(world, 1.0 / 60, 5), TANDEM_OK);
+  CHECK_STATUS(tandem_gpu_world_began(world, &began, &count), TANDEM_OK);
+  CHECK(count > 0 && began[0].a == 0 && began[0].b == 1);
+  CHECK_STATUS(tandem_gpu_world_ended(world, &ended, NULL), TANDEM_OK);
+  CHECK_STATUS(tandem_gpu_world_step(world, 1.0 / 60, 0), TANDEM_OK);
+  CHECK_STATUS(tandem_gpu_world_began(world, &began, &count), TANDEM_OK);
+  CHECK(began == NULL && count == 0);
+  CHECK(tandem_gpu_world_bytes(world) > 10000);
   const tandem_body_motion* bodies = bodies_of(world);
   CHECK(fabs(bodies[1].centre[2] - 1) < 0.02 && bodies[0].centre[2] == 0);
   tandem_gpu_world_destroy(world);
@@ -155,8 +166,27 @@ static void test_wrong_calls(void) {
   motion.pose.rotation[0][0] = 2;
   CHECK_STATUS(tandem_gpu_world_set_body(world, 1, &motion), TANDEM_POSE_NOT_RIGID);
   CHECK(tandem_gpu_world_where(world) == 1);
+  CHECK_STATUS(tandem_gpu_world_set_material(world, 1, NAN, 0, 0), TANDEM_OUT_OF_RANGE);
+  CHECK_STATUS(tandem_gpu_world_set_gravity_scale(world, kBodies, 1), TANDEM_UNKNOWN_INSTANCE);
   CHECK_STATUS(tandem_gpu_world_step(world, 1.0 / 60, 1), TANDEM_OK);
   CHECK(tandem_gpu_world_where(world) == 0);
+  // A body that becomes too fast, in the third step; the steps before are kept.
+  const double force[] = {4e9 * tandem_gpu_world_mass(world, 5), 0, 0};
+  motion.pose = at(100, 0, 1000).pose;
+  CHECK_STATUS(tandem_gpu_world_set_body(world, 5, &motion), TANDEM_OK);
+  CHECK_STATUS(tandem_gpu_world_set_force(world, 5, force, none), TANDEM_OK);
+  CHECK_STATUS(tandem_gpu_world_step(world, 1, 5), TANDEM_OUT_OF_RANGE);
+  CHECK(tandem_gpu_world_where(world) == 5);
+  CHECK(tandem_gpu_world_time(world) > 1.9 && tandem_gpu_world_time(world) < 2.1);
+  // A caller writes what is no number where the steps read it.
+  tandem_gpu_body_state* states = copy_states(world);
+  states[3].velocity[1] = NAN;
+  cuda_must(cudaMemcpy(tandem_gpu_world_states(world, NULL), states, kBodies * sizeof *states,
+                       cudaMemcpyHostToDevice));
+  free(states);
+  CHECK_STATUS(tandem_gpu_world_set_force(world, 5, none, none), TANDEM_OK);
+  CHECK_STATUS(tandem_gpu_world_step(world, 1.0 / 60, 1), TANDEM_OUT_OF_RANGE);
+  CHECK(tandem_gpu_world_where(world) == 3);
   const double density[] = {1000, -1};
   tandem_joint joint = {.kind = TANDEM_BALL, .a = 0, .b = 1};
   tandem_body_start start = {.struct_size = sizeof start, .count = 2, .density = density};
@@ -170,6 +200,38 @@ static void test_wrong_calls(void) {
   CHECK_STATUS(tandem_gpu_world_set_bodies(world, NULL, 0, NULL, NULL), TANDEM_OK);
   CHECK_STATUS(tandem_gpu_world_step(world, 1.0 / 60, 1), TANDEM_OK);
   tandem_gpu_world_destroy(world);
+}
+
+static void test_going_back(void) {
+  tandem_gpu_world* world = world_of_boxes(NULL);
+  tandem_gpu_world_state* state = NULL;
+  tandem_gpu_body_state* first = NULL;
+  CHECK_STATUS(tandem_gpu_world_step(world, 1.0 / 60, 30), TANDEM_OK);
+  CHECK_STATUS(tandem_gpu_world_save(world, &state), TANDEM_OK);
+  for (int run = 0; run < 2; ++run) {
+    CHECK_STATUS(tandem_gpu_world_step(world, 1.0 / 60, 60), TANDEM_OK);
+    tandem_gpu_body_state* states = copy_states(world);
+    if (run == 0) first = states;
+    CHECK(memcmp(states, first, kBodies * sizeof *states) == 0);
+    if (run == 1) free(states);
+    // The floor gets slippery, and a box floats away: the state knows of neither.
+    CHECK_STATUS(tandem_gpu_world_set_material(world, 0, 0, 0, -1), TANDEM_OK);
+    CHECK_STATUS(tandem_gpu_world_set_gravity_scale(world, 8, -1), TANDEM_OK);
+    CHECK_STATUS(tandem_gpu_world_step(world, 1.0 / 60, 30), TANDEM_OK);
+    CHECK(bodies_of(world)[8].velocity[2] > 2);
+    CHECK_STATUS(tandem_gpu_world_restore(world, state), TANDEM_OK);
+    CHECK(fabs(tandem_gpu_world_time(world) - 0.5) < 1e-9);
+  }
+  free(first);
+  tandem_gpu_world* other = world_of_boxes(NULL);
+  CHECK_STATUS(tandem_gpu_world_restore(other, state), TANDEM_KEPT_MISMATCH);
+  CHECK_STATUS(tandem_gpu_world_restore(other, NULL), TANDEM_NULL_ARGUMENT);
+  tandem_gpu_world_destroy(other);
+  tandem_gpu_world_destroy(world);
+  tandem_gpu_world_state_destroy(state);
+  CHECK_STATUS(tandem_gpu_world_save(NULL, &state), TANDEM_NULL_ARGUMENT);
+  CHECK(state == NULL);
+  tandem_gpu_world_state_destroy(NULL);
 }
 
 // Bodies that are excluded pass through each other, and a kinematic one keeps its velocity.
@@ -209,6 +271,7 @@ int main(int argc, char** argv) {
   test_rest();
   test_the_same_bytes_twice();
   test_states_in_place();
+  test_going_back();
   test_a_filter();
   test_wrong_calls();
   tandem_asset_release(box);

@@ -155,6 +155,10 @@ static void test_materials_forces_and_touches(void) {
   CHECK(began[0].speed >= 0 && began[0].speed < 0.1);
   CHECK(began[0].impulse > 0.99 * 9810 / 60 && began[0].impulse < 1.2 * 9810 / 60);
   CHECK(tandem_world_ended(world, &count) == NULL && count == 0);
+  CHECK_STATUS(tandem_world_step_more(world, 1.0 / 60, 2), TANDEM_OK);
+  CHECK(tandem_world_began(world, &count) != NULL && count == 1);
+  CHECK_STATUS(tandem_world_step_more(world, 0, 2), TANDEM_BAD_DURATION);
+  CHECK_STATUS(tandem_world_step_more(NULL, 1, 2), TANDEM_NULL_ARGUMENT);
   CHECK_STATUS(tandem_world_set_force(world, 1, strong, none), TANDEM_OK);
   CHECK_STATUS(tandem_world_step(world, 1.0 / 60, 30), TANDEM_OK);
   CHECK(fabs(body_of(world, 1)->velocity[0] - 0.5 * 0.1 * 9.81) < 0.01);

@@ -6,6 +6,7 @@
 #include <cstring>
 
 #include "dynamics/falling_bodies.h"
+#include "dynamics/lists_of_steps.h"
 #include "dynamics/world_setup.h"
 
 namespace tandem::test {
@@ -103,9 +104,186 @@ TEST(GpuWorlds, ComeToRestAndSleep) {
     EXPECT_GT(body.centre[2], -0.21);
   }
   EXPECT_GT(asleep, 25u);
-  std::span<const ObjectPair> touching;
+  std::span<const WorldTouch> touching;
   ASSERT_EQ(both.world.touching(touching), Status::kOk);
   EXPECT_GT(touching.size(), 25u);
+}
+
+// A box that stands on a floor from 5 mm above it, so that it touches from a step on that both find.
+FallingBodies box_above_floor() {
+  FallingBodies bodies(1);
+  BodyDescription& body = bodies.descriptions.emplace_back();
+  body.asset = 3, body.pose = shift(0, 0, 0.105);
+  return bodies;
+}
+
+struct Lists {
+  std::vector<WorldTouch> touching, began;
+  std::vector<ObjectPair> ended;
+};
+
+Lists lists_of(GpuWorld& world) {
+  Lists out;
+  std::span<const WorldTouch> touches;
+  std::span<const ObjectPair> pairs;
+  EXPECT_EQ(world.touching(touches), Status::kOk);
+  out.touching.assign(touches.begin(), touches.end());
+  EXPECT_EQ(world.began(touches), Status::kOk);
+  out.began.assign(touches.begin(), touches.end());
+  EXPECT_EQ(world.ended(pairs), Status::kOk);
+  out.ended.assign(pairs.begin(), pairs.end());
+  return out;
+}
+
+void expect_near(std::span<const WorldTouch> touches, std::span<const WorldTouch> expected) {
+  ASSERT_EQ(touches.size(), expected.size());
+  for (std::size_t i = 0; i < touches.size(); ++i) {
+    EXPECT_EQ(touches[i].a, expected[i].a);
+    EXPECT_EQ(touches[i].b, expected[i].b);
+    EXPECT_NEAR(touches[i].impulse, expected[i].impulse, 1e-3);
+    EXPECT_NEAR(touches[i].speed, expected[i].speed, 1e-3);
+  }
+}
+
+TEST(GpuWorlds, TellWhatTouchesAsASimulationDoes) {
+  NEEDS_GPU();
+  BothWorlds both(box_above_floor());
+  std::vector<WorldTouch> began;
+  for (int step = 0; step < 20; ++step) {
+    both.simulation->step();
+    const Touches& touches = both.simulation->touches();
+    add_touches(touches.began(), touches.touching(), began);
+    ASSERT_EQ(step == 0 ? both.world.step(1.0 / 60) : both.world.step_more(1.0 / 60), Status::kOk);
+    const Lists lists = lists_of(both.world);
+    expect_near(lists.touching, touches.touching());
+    expect_near(lists.began, began);
+    EXPECT_TRUE(lists.ended.empty());
+  }
+  ASSERT_EQ(began.size(), 1u);
+  EXPECT_GT(began[0].speed, 0.1);
+  // It flies off, and what has parted is told though the two are not near each other any more.
+  const double up[3] = {0, 0, 10 * both.world.mass_of(1)}, at[3] = {0, 0, 0.1};
+  ASSERT_EQ(both.world.push(1, up, at), Status::kOk);
+  ASSERT_EQ(both.world.step(1.0 / 60, 40), Status::kOk);
+  Lists lists = lists_of(both.world);
+  EXPECT_TRUE(lists.touching.empty() && lists.began.empty());
+  ASSERT_EQ(lists.ended.size(), 1u);
+  EXPECT_TRUE(lists.ended[0].a == 0 && lists.ended[0].b == 1);
+  ASSERT_EQ(both.world.step(1.0 / 60, 0), Status::kOk);
+  EXPECT_TRUE(lists_of(both.world).ended.empty());
+}
+
+TEST(GpuWorlds, TellTheSameHoweverStepsAreCalled) {
+  NEEDS_GPU();
+  const FallingBodies bodies(40, 3);
+  BothWorlds one(bodies), many(bodies);
+  ASSERT_EQ(one.world.step(1.0 / 60, 150), Status::kOk);
+  for (int step = 0; step < 150; ++step) {
+    ASSERT_EQ(step == 0 ? many.world.step(1.0 / 60) : many.world.step_more(1.0 / 60), Status::kOk);
+    if (step % 7 == 0) lists_of(many.world);
+  }
+  const Lists lists = lists_of(one.world), others = lists_of(many.world);
+  EXPECT_GT(lists.began.size(), 30u);
+  EXPECT_GT(lists.ended.size(), 5u);
+  const auto same = [](const auto& p, const auto& q) {
+    return p.size() == q.size() && std::memcmp(p.data(), q.data(), p.size() * sizeof p[0]) == 0;
+  };
+  EXPECT_TRUE(same(lists.touching, others.touching));
+  EXPECT_TRUE(same(lists.began, others.began));
+  EXPECT_TRUE(same(lists.ended, others.ended));
+}
+
+TEST(GpuWorlds, TakeOtherMaterialsAndGravity) {
+  NEEDS_GPU();
+  FallingBodies bodies = box_above_floor();
+  BothWorlds both(bodies, {.gravity = {2, 0, -9.81}});
+  GpuWorld& world = both.world;
+  ASSERT_EQ(world.step(1.0 / 60, 90), Status::kOk);
+  std::span<const BodyMotion> motions;
+  ASSERT_EQ(world.bodies(motions), Status::kOk);
+  ASSERT_TRUE(motions[1].sleeps);
+  ASSERT_EQ(world.set_material(0, Material{}), Status::kOk);
+  ASSERT_EQ(world.bodies(motions), Status::kOk);
+  EXPECT_TRUE(motions[1].sleeps);  // nothing is new
+  ASSERT_EQ(world.set_material(0, {.friction = 0}), Status::kOk);
+  ASSERT_EQ(world.bodies(motions), Status::kOk);
+  EXPECT_FALSE(motions[1].sleeps);
+  ASSERT_EQ(world.step(1.0 / 60, 12), Status::kOk);
+  ASSERT_EQ(world.bodies(motions), Status::kOk);
+  EXPECT_NEAR(motions[1].velocity[0], 0.4, 0.02);
+  const double before = motions[1].velocity[0];
+  ASSERT_EQ(world.set_gravity_scale(1, 0), Status::kOk);
+  ASSERT_EQ(world.step(1.0 / 60, 12), Status::kOk);
+  ASSERT_EQ(world.bodies(motions), Status::kOk);
+  EXPECT_NEAR(motions[1].velocity[0], before, 1e-6);
+  EXPECT_EQ(world.set_material(2, Material{}), Status::kUnknownInstance);
+  EXPECT_EQ(world.set_material(1, {.friction = std::nan("")}), Status::kOutOfRange);
+  EXPECT_EQ(world.set_gravity_scale(1, 1e300), Status::kOutOfRange);
+  EXPECT_EQ(world.where(), 1u);
+}
+
+TEST(GpuWorlds, GoBackToAState) {
+  NEEDS_GPU();
+  const FallingBodies bodies(40, 3);
+  BothWorlds both(bodies);
+  GpuWorld& world = both.world;
+  const double force[3] = {0.2, 0, 0}, none[3] = {}, away[3] = {0, 0, 50};
+  ASSERT_EQ(world.set_force(5, force, none), Status::kOk);
+  ASSERT_EQ(world.step(1.0 / 60, 60), Status::kOk);
+  std::shared_ptr<const GpuWorld::State> state;
+  ASSERT_EQ(world.save(state), Status::kOk);
+  const double time = world.time();
+  std::vector<std::vector<BodyState>> states[2];
+  for (auto& of_run : states) {
+    for (int step = 0; step < 60; ++step) {
+      ASSERT_EQ(world.step(1.0 / 60), Status::kOk);
+      of_run.push_back(both.on_gpu());
+    }
+    // What happens meanwhile does not matter.
+    ASSERT_EQ(world.set_material(0, {.friction = 0}), Status::kOk);
+    ASSERT_EQ(world.set_gravity_scale(3, 4), Status::kOk);
+    ASSERT_EQ(world.set_force(4, away, none), Status::kOk);
+    ASSERT_EQ(world.step(1.0 / 120, 100), Status::kOk);
+    ASSERT_EQ(world.restore(*state), Status::kOk);
+    EXPECT_EQ(world.time(), time);
+    std::span<const WorldContact> contacts;
+    ASSERT_EQ(world.contacts(contacts), Status::kOk);
+    EXPECT_TRUE(contacts.empty());
+    const Lists lists = lists_of(world);
+    EXPECT_FALSE(lists.touching.empty());
+    EXPECT_TRUE(lists.began.empty() && lists.ended.empty());
+  }
+  for (std::size_t step = 0; step < states[0].size(); ++step) {
+    EXPECT_EQ(std::memcmp(states[0][step].data(), states[1][step].data(),
+                          bodies.descriptions.size() * sizeof(BodyState)),
+              0)
+        << step;
+  }
+  ASSERT_EQ(world.set_bodies(bodies.descriptions), Status::kOk);
+  EXPECT_EQ(world.restore(*state), Status::kKeptMismatch);
+  ASSERT_EQ(world.step(1.0 / 60), Status::kOk);
+}
+
+TEST(GpuWorlds, SayWhatMemoryTheyTake) {
+  NEEDS_GPU();
+  FallingBodies bodies(1);
+  for (int i = 0; i < 30'000; ++i) {
+    BodyDescription& body = bodies.descriptions.emplace_back();
+    body.asset = 3,
+    body.pose = shift(0.5 * (i % 50) - 12, 0.5 * (i / 50 % 50) - 12, 0.1 + 0.201 * (i / 2500));
+  }
+  GpuWorld world;
+  ASSERT_EQ(world.set_assets(bodies.assets.views()), Status::kOk);
+  const std::size_t empty = world.bytes();
+  std::size_t before = 0, after = 0, total = 0;
+  ASSERT_EQ(cudaMemGetInfo(&before, &total), cudaSuccess);
+  ASSERT_EQ(world.set_bodies(bodies.descriptions), Status::kOk);
+  ASSERT_EQ(world.step(1.0 / 60, 4), Status::kOk);
+  ASSERT_EQ(cudaMemGetInfo(&after, &total), cudaSuccess);
+  const double told = static_cast<double>(world.bytes() - empty), taken = static_cast<double>(before - after);
+  EXPECT_GT(told, 1e8);
+  // The driver takes memory in large pieces, and for graphs and kernels.
+  EXPECT_NEAR(told / taken, 1, 0.2);
 }
 
 TEST(GpuWorlds, WakeWhatIsPushed) {
@@ -123,6 +301,47 @@ TEST(GpuWorlds, WakeWhatIsPushed) {
   EXPECT_GT(motions[1].centre[2], at[2] + 0.05);
   EXPECT_NEAR(motions[1].centre[0], x, 0.5);
   EXPECT_FALSE(motions[1].sleeps);
+}
+
+// A number that callers write where the steps read it, or that the steps make, stops the world.
+TEST(GpuWorlds, NameABodyThatLeavesTheRangeOfNumbers) {
+  NEEDS_GPU();
+  const FallingBodies bodies(6, 4);
+  BothWorlds both(bodies);
+  GpuWorld& world = both.world;
+  ASSERT_EQ(world.step(1.0 / 60, 20), Status::kOk);
+  const double time = world.time();
+  const std::vector<BodyState> good = both.on_gpu();
+  for (const double number : {std::nan(""), HUGE_VAL, 1e301}) {
+    for (const bool of_place : {false, true}) {
+      std::vector<BodyState> wrong = good;
+      (of_place ? wrong[3].position : wrong[3].velocity).y = number;
+      const auto write = [&](const std::vector<BodyState>& states) {
+        ASSERT_EQ(
+            cudaMemcpy(world.states(), states.data(), states.size() * sizeof(BodyState), cudaMemcpyDefault),
+            cudaSuccess);
+        ASSERT_EQ(world.wake(), Status::kOk);
+      };
+      write(wrong);
+      EXPECT_EQ(world.step(1.0 / 60, 3), Status::kOutOfRange) << number;
+      EXPECT_EQ(world.where(), 3u);
+      EXPECT_EQ(world.time(), time);
+      std::span<const WorldContact> contacts;
+      ASSERT_EQ(world.contacts(contacts), Status::kOk);
+      EXPECT_TRUE(contacts.empty());
+      write(good);
+    }
+  }
+  std::span<const BodyMotion> motions;
+  ASSERT_EQ(world.bodies(motions), Status::kOk);
+  BodyMotion away = motions[3];
+  away.pose.translation[2] += 1000;
+  ASSERT_EQ(world.set(3, away), Status::kOk);
+  const double force[3] = {9e9 * world.mass_of(3), 0, 0}, none[3] = {};
+  ASSERT_EQ(world.set_force(3, force, none), Status::kOk);
+  EXPECT_EQ(world.step(1, 5), Status::kOutOfRange);
+  EXPECT_EQ(world.where(), 3u);
+  ASSERT_EQ(world.set_force(3, none, none), Status::kOk);
 }
 
 TEST(GpuWorlds, NameWhatIsWrong) {

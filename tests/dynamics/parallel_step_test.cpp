@@ -142,6 +142,37 @@ TEST(ParallelStep, GoesBackToAState) {
   EXPECT_GT(both.touching, 1000u);
 }
 
+// A body of which a number is none, or becomes too fast, stops the step, which changes nothing.
+TEST(ParallelStep, NamesABodyThatLeavesTheRangeOfNumbers) {
+  const FallingBodies bodies(8, 3);
+  BothWays both(bodies);
+  both.steps(30, [](int) {});
+  const BodyState good = both.states()[3];
+  const auto stops = [&](const BodyState& state) {
+    ASSERT_EQ(both.parallel.place(3, state), Status::kOk);
+    for (int times = 0; times < 2; ++times) {
+      EXPECT_EQ(both.parallel.step(1.0 / 60), Status::kOutOfRange);
+      EXPECT_EQ(both.parallel.bad_body(), 3u);
+    }
+  };
+  for (const double number : {std::nan(""), HUGE_VAL, 1e301, 1.1 * kFastest}) {
+    BodyState wrong = good;
+    wrong.velocity.y = number;
+    stops(wrong);
+    wrong = good, wrong.orientation.x = number;
+    stops(wrong);
+    wrong = good, wrong.position.z = number;
+    if (number != 1.1 * kFastest) stops(wrong);
+  }
+  BodyState away = good;
+  away.position.z += 1000;
+  both.place(3, away);
+  both.set_force(3, {{9e9 * both.simulation->bodies()[3].mass, 0, 0}, {}});
+  EXPECT_EQ(both.parallel.step(1), Status::kOk);
+  EXPECT_EQ(both.parallel.step(1), Status::kOutOfRange);
+  EXPECT_EQ(both.parallel.bad_body(), 3u);
+}
+
 // Boxes that stand side by side, a hair apart, and the first is pushed: of what the others do in the step
 // nobody knows when it begins.
 TEST(ParallelStep, FindsWhatAStepMissed) {

@@ -45,16 +45,20 @@ def test_the_program_runs(tmp_path):
     subprocess.run([sys.executable, PROGRAM], check=True, capture_output=True, cwd=tmp_path)
 
 
+# What classes of the extensions have in common, which only the stubs name.
+COMMON = {node.name: node.body for node in ast.parse((PACKAGE / "_tandem.pyi").read_text()).body if isinstance(node, ast.ClassDef) and node.name[0] == "_"}
+
+
 def signatures(text):
     """Names of functions and methods, and how many arguments each has."""
     found = {}
     for node in ast.parse(text).body:
         if isinstance(node, ast.FunctionDef):
             found[node.name] = len(node.args.posonlyargs)
-        elif isinstance(node, ast.ClassDef):
+        elif isinstance(node, ast.ClassDef) and node.name not in COMMON:
             found[node.name] = None
-            found |= {f"{node.name}.{method.name}": len(method.args.posonlyargs) or len(method.args.args) for method in node.body
-                      if isinstance(method, ast.FunctionDef)}
+            body = sum((COMMON.get(base.id, []) for base in node.bases if isinstance(base, ast.Name)), node.body)
+            found |= {f"{node.name}.{method.name}": len(method.args.posonlyargs) or len(method.args.args) for method in body if isinstance(method, ast.FunctionDef)}
     return found
 
 

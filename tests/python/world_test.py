@@ -1,9 +1,6 @@
 """Worlds: bodies come to rest, what is asked of them, wrong calls, threads and Ctrl-C."""
 import itertools
 import os
-import signal
-import threading
-import time
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +8,7 @@ import pytest
 
 import solids
 import tandem
+import worlds
 from meshes import needs_alarm
 
 ASSETS = Path(os.environ["TANDEM_SOURCE_DIR"]) / "assets"
@@ -398,34 +396,11 @@ def test_strange_scenes_stay_finite(continuous):
 
 
 def test_a_second_thread_is_refused_and_others_run():
-    world, refused, done = pile(60), [], threading.Event()
-
-    def work():
-        world.step(1 / 240, 200)
-        done.set()
-
-    worker = threading.Thread(target=work)
-    worker.start()
-    while not done.is_set():
-        try:
-            world.translation
-        except RuntimeError as error:
-            refused.append(str(error))
-    worker.join()
-    assert set(refused) == {"another thread is in a call of this world"}
+    worlds.expect_that_a_second_thread_is_refused(pile(60))
 
 
 @needs_alarm
 def test_ctrl_c_ends_many_steps():
     world = pair(sleeping=False)
-    signal.signal(signal.SIGALRM, signal.default_int_handler)
-    signal.setitimer(signal.ITIMER_REAL, 0.2)
-    start = time.monotonic()
-    try:
-        with pytest.raises(KeyboardInterrupt):
-            world.step(1 / 60, 2**40)
-    finally:
-        signal.setitimer(signal.ITIMER_REAL, 0)
-        signal.signal(signal.SIGALRM, signal.SIG_DFL)
-    assert time.monotonic() - start < 5 and world.time > 0 and world.translation[1, 2] == pytest.approx(1, abs=1e-3)
-    world.step(1 / 60)
+    worlds.expect_that_ctrl_c_ends_many_steps(world, after=0.2)
+    assert world.translation[1, 2] == pytest.approx(1, abs=1e-3)

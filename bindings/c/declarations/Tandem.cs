@@ -848,6 +848,7 @@ public static unsafe class Native {
   [DllImport("tandem")] public static extern uint tandem_world_set_assets(IntPtr world, IntPtr* assets, UIntPtr count);
   [DllImport("tandem")] public static extern uint tandem_world_set_bodies(IntPtr world, tandem_instance* instances, UIntPtr count, tandem_pair_filter* filter, tandem_body_start* start);
   [DllImport("tandem")] public static extern uint tandem_world_step(IntPtr world, double dt, uint steps);
+  [DllImport("tandem")] public static extern uint tandem_world_step_more(IntPtr world, double dt, uint steps);
   [DllImport("tandem")] public static extern tandem_body_motion* tandem_world_bodies(IntPtr world, UIntPtr* count);
   [DllImport("tandem")] public static extern tandem_world_contact* tandem_world_contacts(IntPtr world, UIntPtr* count);
   [DllImport("tandem")] public static extern tandem_world_touch* tandem_world_touching(IntPtr world, UIntPtr* count);

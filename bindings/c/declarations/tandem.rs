@@ -937,6 +937,7 @@ extern "C" {
     pub fn tandem_world_set_assets(world: *mut tandem_world, assets: *const *mut tandem_asset, count: usize) -> tandem_status;
     pub fn tandem_world_set_bodies(world: *mut tandem_world, instances: *const tandem_instance, count: usize, filter: *const tandem_pair_filter, start: *const tandem_body_start) -> tandem_status;
     pub fn tandem_world_step(world: *mut tandem_world, dt: f64, steps: u32) -> tandem_status;
+    pub fn tandem_world_step_more(world: *mut tandem_world, dt: f64, steps: u32) -> tandem_status;
     pub fn tandem_world_bodies(world: *const tandem_world, count: *mut usize) -> *const tandem_body_motion;
     pub fn tandem_world_contacts(world: *const tandem_world, count: *mut usize) -> *const tandem_world_contact;
     pub fn tandem_world_touching(world: *const tandem_world, count: *mut usize) -> *const tandem_world_touch;

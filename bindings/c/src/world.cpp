@@ -1,6 +1,5 @@
 #include "tandem/dynamics/world.h"
 
-#include <memory>
 #include <span>
 
 #include "world_handle.h"
@@ -10,10 +9,9 @@ using namespace tandem::c;
 
 struct tandem_world : WorldHandle<World> {};
 
-struct tandem_world_state : Allocated {
-  Allocator allocator;
-  std::shared_ptr<const World::State> state;
-};
+struct tandem_world_state : WorldStateHandle<World> {};
+
+TANDEM_WORLD_HANDLE(tandem_world, World)
 
 namespace {
 
@@ -32,10 +30,6 @@ tandem_status tandem_world_create(const tandem_world_options* options, const tan
   });
 }
 
-void tandem_world_destroy(tandem_world* world) {
-  delete world;
-}
-
 tandem_status tandem_world_set_assets(tandem_world* world, tandem_asset* const* assets, size_t count) {
   return set_world_assets(world, assets, count, [](tandem_world& self, std::span<const AssetView> views) {
     return self.world.set_assets(views);
@@ -48,10 +42,6 @@ tandem_status tandem_world_set_bodies(tandem_world* world, const tandem_instance
       world, instances, count, filter, start, [](tandem_world& self, const GivenBodies& given) {
         return self.world.set_bodies(given.bodies, self.options, given.excluded, given.joints);
       });
-}
-
-tandem_status tandem_world_step(tandem_world* world, double dt, uint32_t steps) {
-  return enter(world, [&](tandem_world& self) { return self.told(self.world.step(dt, steps)); });
 }
 
 const tandem_body_motion* tandem_world_bodies(const tandem_world* world, size_t* count) {
@@ -98,62 +88,4 @@ tandem_status tandem_world_remove_joint(tandem_world* world, uint32_t joint) {
 tandem_status tandem_world_set_motor(tandem_world* world, uint32_t joint, double speed, double most_effort) {
   return enter(
       world, [&](tandem_world& self) { return self.told(self.world.set_motor(joint, speed, most_effort)); });
-}
-
-double tandem_world_time(const tandem_world* world) {
-  return world != nullptr ? world->world.time() : 0;
-}
-
-double tandem_world_mass(const tandem_world* world, uint32_t body) {
-  return world != nullptr ? world->world.mass_of(body) : 0;
-}
-
-tandem_status tandem_world_set_body(tandem_world* world, uint32_t body, const tandem_body_motion* motion) {
-  return set_body(world, body, motion);
-}
-
-tandem_status tandem_world_set_material(tandem_world* world, uint32_t body, double friction,
-                                        double restitution, double rolling_resistance) {
-  return enter(world, [&](tandem_world& self) {
-    return self.told(self.world.set_material(body, {friction, restitution, rolling_resistance}));
-  });
-}
-
-tandem_status tandem_world_set_gravity_scale(tandem_world* world, uint32_t body, double gravity_scale) {
-  return enter(world, [&](tandem_world& self) {
-    return self.told(self.world.set_gravity_scale(body, gravity_scale));
-  });
-}
-
-tandem_status tandem_world_push(tandem_world* world, uint32_t body, const double* impulse, const double* at) {
-  return call_with_two(world, &World::push, body, impulse, at);
-}
-
-tandem_status tandem_world_set_force(tandem_world* world, uint32_t body, const double* force,
-                                     const double* torque) {
-  return call_with_two(world, &World::set_force, body, force, torque);
-}
-
-tandem_status tandem_world_save(const tandem_world* world, tandem_world_state** state) {
-  if (state != nullptr) *state = nullptr;
-  if (world == nullptr) return TANDEM_NULL_ARGUMENT;
-  const Allocator& from = world->allocator;
-  const tandem_allocator allocator = {sizeof allocator, 0, from.user, from.allocate, from.deallocate};
-  return create(from.allocate != nullptr ? &allocator : nullptr, state,
-                [&](tandem_world_state& made) { return to_c(world->world.save(made.state)); });
-}
-
-tandem_status tandem_world_restore(tandem_world* world, const tandem_world_state* state) {
-  return enter(world, [&](tandem_world& self) -> tandem_status {
-    return state != nullptr ? self.told(self.world.restore(*state->state))
-                            : tandem_status{TANDEM_NULL_ARGUMENT};
-  });
-}
-
-void tandem_world_state_destroy(tandem_world_state* state) {
-  delete state;
-}
-
-uint64_t tandem_world_where(const tandem_world* world) {
-  return world != nullptr ? world->where : 0;
 }

@@ -1,4 +1,5 @@
 #pragma once
+#include <memory>
 #include <new>
 
 #include "given_bodies.h"
@@ -21,10 +22,18 @@ struct WorldHandle : Allocated {
     where = at;
     return status;
   }
-  /// The interface's number of what the world returned. A handle that keeps more of an error hides it.
+  /// The interface's number of what the world returned. A handle that keeps more of an error hides both.
+  tandem_status number_of(Status status) const { return to_c(status); }
   tandem_status told(Status status) {
     return status == Status::kOk ? tandem_status{TANDEM_OK} : fail(to_c(status), world.where());
   }
+};
+
+/// The base of the handle of a world's state.
+template <typename Of>
+struct WorldStateHandle : Allocated {
+  Allocator allocator;
+  std::shared_ptr<const typename Of::State> state;
 };
 
 /// Runs the body of a function, see guarded(); `where` begins as 0.
@@ -86,4 +95,72 @@ tandem_status call_with_two(Handle* world, Function call, uint32_t body, const d
   });
 }
 
+/// Keeps the state of a world by its allocator.
+template <typename Handle, typename State>
+tandem_status save_state(const Handle* world, State** state) noexcept {
+  if (state != nullptr) *state = nullptr;
+  if (world == nullptr) return TANDEM_NULL_ARGUMENT;
+  const Allocator& from = world->allocator;
+  const tandem_allocator allocator = {sizeof allocator, 0, from.user, from.allocate, from.deallocate};
+  return create(from.allocate != nullptr ? &allocator : nullptr, state,
+                [&](State& made) { return world->number_of(world->world.save(made.state)); });
+}
+
+template <typename Handle, typename State>
+tandem_status restore_state(Handle* world, const State* state) noexcept {
+  return enter(world, [&](Handle& self) -> tandem_status {
+    return state != nullptr ? self.told(self.world.restore(*state->state))
+                            : tandem_status{TANDEM_NULL_ARGUMENT};
+  });
+}
+
 }  // namespace tandem::c
+
+/// Defines the functions that worlds of both kinds have in the same form. of: the handle. Of: its world.
+#define TANDEM_WORLD_HANDLE(of, Of)                                                                       \
+  void of##_destroy(of* world) {                                                                          \
+    delete world;                                                                                         \
+  }                                                                                                       \
+  tandem_status of##_step(of* world, double dt, uint32_t steps) {                                         \
+    return enter(world, [&](of& self) { return self.told(self.world.step(dt, steps)); });                 \
+  }                                                                                                       \
+  tandem_status of##_step_more(of* world, double dt, uint32_t steps) {                                    \
+    return enter(world, [&](of& self) { return self.told(self.world.step_more(dt, steps)); });            \
+  }                                                                                                       \
+  double of##_time(const of* world) {                                                                     \
+    return world != nullptr ? world->world.time() : 0;                                                    \
+  }                                                                                                       \
+  double of##_mass(const of* world, uint32_t body) {                                                      \
+    return world != nullptr ? world->world.mass_of(body) : 0;                                             \
+  }                                                                                                       \
+  tandem_status of##_set_body(of* world, uint32_t body, const tandem_body_motion* motion) {               \
+    return set_body(world, body, motion);                                                                 \
+  }                                                                                                       \
+  tandem_status of##_set_material(of* world, uint32_t body, double friction, double restitution,          \
+                                  double rolling_resistance) {                                            \
+    return enter(world, [&](of& self) {                                                                   \
+      return self.told(self.world.set_material(body, {friction, restitution, rolling_resistance}));       \
+    });                                                                                                   \
+  }                                                                                                       \
+  tandem_status of##_set_gravity_scale(of* world, uint32_t body, double gravity_scale) {                  \
+    return enter(world,                                                                                   \
+                 [&](of& self) { return self.told(self.world.set_gravity_scale(body, gravity_scale)); }); \
+  }                                                                                                       \
+  tandem_status of##_push(of* world, uint32_t body, const double* impulse, const double* at) {            \
+    return call_with_two(world, &Of::push, body, impulse, at);                                            \
+  }                                                                                                       \
+  tandem_status of##_set_force(of* world, uint32_t body, const double* force, const double* torque) {     \
+    return call_with_two(world, &Of::set_force, body, force, torque);                                     \
+  }                                                                                                       \
+  tandem_status of##_save(const of* world, of##_state** state) {                                          \
+    return save_state(world, state);                                                                      \
+  }                                                                                                       \
+  tandem_status of##_restore(of* world, const of##_state* state) {                                        \
+    return restore_state(world, state);                                                                   \
+  }                                                                                                       \
+  void of##_state_destroy(of##_state* state) {                                                            \
+    delete state;                                                                                         \
+  }                                                                                                       \
+  uint64_t of##_where(const of* world) {                                                                  \
+    return world != nullptr ? world->where : 0;                                                           \
+  }

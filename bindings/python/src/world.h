@@ -53,21 +53,58 @@ inline tandem_world_options options_of(const GivenOptions& given) {
   return options;
 }
 
-/// A world of the C interface, on the CPU or on a GPU. Engine has the functions of its kind of world, as
-/// static members:
-///   Handle;                       what a world is
-///   create, destroy, set_bodies, step, set_body, push, set_force, time, mass, where;   those of C
+/// Names the types and functions of the C interface that worlds of both kinds have in the same form, as
+/// static members of an Engine. of: the handle.
+#define TANDEM_WORLD_ENGINE(of)                                     \
+  using Handle = of;                                                \
+  using StateHandle = of##_state;                                   \
+  static constexpr auto create = of##_create;                       \
+  static constexpr auto destroy = of##_destroy;                     \
+  static constexpr auto set_bodies = of##_set_bodies;               \
+  static constexpr auto step = of##_step;                           \
+  static constexpr auto step_more = of##_step_more;                 \
+  static constexpr auto set_body = of##_set_body;                   \
+  static constexpr auto set_material = of##_set_material;           \
+  static constexpr auto set_gravity_scale = of##_set_gravity_scale; \
+  static constexpr auto push = of##_push;                           \
+  static constexpr auto set_force = of##_set_force;                 \
+  static constexpr auto save = of##_save;                           \
+  static constexpr auto restore = of##_restore;                     \
+  static constexpr auto state_destroy = of##_state_destroy;         \
+  static constexpr auto time = of##_time;                           \
+  static constexpr auto mass = of##_mass;                           \
+  static constexpr auto where = of##_where
+
+/// What a world was at some time. It keeps the engine, which says where it is.
+template <typename Engine>
+class WorldState {
+ public:
+  using Handle = typename Engine::StateHandle;
+
+  WorldState(Handle* state, const Engine& engine)
+      : state_(state, [engine](Handle* kept) {
+          [[maybe_unused]] const auto here = engine.here();
+          Engine::state_destroy(kept);
+        }) {}
+  const Handle* get() const { return state_.get(); }
+
+ private:
+  std::shared_ptr<Handle> state_;
+};
+
+/// A world of the C interface, on the CPU or on a GPU. Engine has the functions of its kind of world: those
+/// of TANDEM_WORLD_ENGINE, and as static members
 ///   set_assets(world, assets, count), count(world);   the latter of bodies
-///   bodies, contacts, touching;   these return a tandem_status of (world, &rows, &count)
+///   bodies, contacts, touching, began, ended;   these return a tandem_status of (world, &rows, &count)
 /// and here(), not static, returns what lives during a call.
 template <typename Engine>
 class WorldOf {
  public:
   using Handle = typename Engine::Handle;
+  using State = WorldState<Engine>;
 
   WorldOf(nb::list assets, const GivenOptions& options, Engine engine = {})
       : engine_(engine), assets_(std::move(assets)), options_(options_of(options)), world_(make()) {}
-  virtual ~WorldOf() = default;
 
   void set_bodies(nb::handle instances, const Filter* filter, nb::handle density, nb::handle velocity,
                   nb::handle angular_velocity, nb::handle friction, nb::handle restitution,
@@ -88,7 +125,6 @@ class WorldOf {
     take(restitution, 1, start.restitution);
     take(rolling_resistance, 1, start.rolling_resistance);
     take(gravity_scale, 1, start.gravity_scale);
-    forget_call();
     const auto joined = copy_rows<tandem_joint>(joints);
     start.joints = joined.data(), start.joint_count = joined.size();
     // Somebody keeps the memory of the bodies before, which placing others would free.
@@ -103,14 +139,12 @@ class WorldOf {
     using Clock = std::chrono::steady_clock;
     const Turn turn = take_turn();
     std::uint64_t done = 0;
-    forget_call();
     do {
       ask([&](Handle* world) {
         const auto soon = Clock::now() + std::chrono::milliseconds(50);
         tandem_status status = TANDEM_OK;
         do {
-          status = Engine::step(world, dt, done < steps);
-          take_changes();
+          status = (done == 0 ? Engine::step : Engine::step_more)(world, dt, done < steps);
         } while (status == TANDEM_OK && ++done < steps && Clock::now() < soon);
         return status;
       });
@@ -125,6 +159,28 @@ class WorldOf {
     ask([&](Handle* world) { return Engine::set_body(world, body, rows.data()); });
   }
 
+  void set_material(std::uint32_t body, double friction, double restitution, double rolling_resistance) {
+    const Turn turn = take_turn();
+    ask([&](Handle* world) {
+      return Engine::set_material(world, body, friction, restitution, rolling_resistance);
+    });
+  }
+  void set_gravity_scale(std::uint32_t body, double scale) {
+    const Turn turn = take_turn();
+    ask([&](Handle* world) { return Engine::set_gravity_scale(world, body, scale); });
+  }
+
+  State save() {
+    const Turn turn = take_turn();
+    typename Engine::StateHandle* state = nullptr;
+    ask([&](Handle* world) { return Engine::save(world, &state); });
+    return {state, engine_};
+  }
+  void restore(const State& state) {
+    const Turn turn = take_turn();
+    ask([&](Handle* world) { return Engine::restore(world, state.get()); });
+  }
+
   void push(std::uint32_t body, nb::handle impulse, nb::handle at) {
     with_two(Engine::push, body, impulse, at);
   }
@@ -135,6 +191,8 @@ class WorldOf {
   nb::object bodies() { return rows(Engine::bodies); }
   nb::object contacts() { return rows(Engine::contacts); }
   nb::object touching() { return rows(Engine::touching); }
+  nb::object began() { return rows(Engine::began); }
+  nb::object ended() { return rows(Engine::ended); }
 
   std::size_t count() {
     const Turn turn = take_turn();
@@ -160,10 +218,6 @@ class WorldOf {
   /// Keeps the world, and the memory of its bodies.
   const std::shared_ptr<Handle>& keeper() const { return world_; }
   const Engine& engine() const { return engine_; }
-
-  /// A call of step() or set_bodies() begins, or a step was made.
-  virtual void forget_call() {}
-  virtual void take_changes() {}
 
   /// Makes a call of the C interface without the interpreter's lock.
   template <typename Call>
@@ -225,6 +279,7 @@ class WorldOf {
 /// assets, GivenOptions and Place...
 template <typename Of, typename... Place>
 nb::class_<Of> add_world(nb::module_& module) {
+  nb::class_<typename Of::State>(module, "WorldState");
   const auto none = [] { return nb::arg().none(); };
   nb::class_<Of> made(module, "World");
   made.def(
@@ -243,11 +298,17 @@ nb::class_<Of> add_world(nb::module_& module) {
            none(), nb::arg())
       .def("step", &Of::step)
       .def("set_body", &Of::set_body)
+      .def("set_material", &Of::set_material)
+      .def("set_gravity_scale", &Of::set_gravity_scale)
       .def("push", &Of::push)
       .def("set_force", &Of::set_force)
       .def("bodies", &Of::bodies)
       .def("contacts", &Of::contacts)
       .def("touching", &Of::touching)
+      .def("began", &Of::began)
+      .def("ended", &Of::ended)
+      .def("save", &Of::save)
+      .def("restore", &Of::restore)
       .def("count", &Of::count)
       .def("time", &Of::time)
       .def("masses", &Of::masses);

@@ -94,7 +94,7 @@ class WorldState:
 
     __slots__ = ("_core",)
 
-    def __init__(self, core: _tandem.WorldState):
+    def __init__(self, core: _tandem.WorldState | _cuda.WorldState):
         self._core = core
 
 
@@ -181,9 +181,8 @@ class World:
         threads: that a call may use, 1 to 1,024, the caller's thread included. Results do not depend on it. Not looked at on a GPU.
         device: "cpu", or "cuda" or "cuda:1", the GPU on which the bodies move.
 
-    On a GPU bodies move by the same rules, but all contacts are soft, and there are no joints, no continuous motion, no states to save, and no changes of
-    materials: what is missing raises NotImplementedError. Results are arrays in CPU memory, as on the CPU, and `states` lies in GPU memory. The same calls give
-    the same bytes on GPUs of one kind, but not those of the CPU.
+    On a GPU bodies move by the same rules, but all contacts are soft, and there are no joints and no continuous motion, which raise NotImplementedError. Results
+    are arrays in CPU memory, as on the CPU, and `states` lies in GPU memory. The same calls give the same bytes on GPUs of one kind, but not those of the CPU.
 
     Calls let other Python threads run. A world takes one call at a time: a second thread gets RuntimeError; several worlds may share assets.
 
@@ -343,11 +342,11 @@ class World:
             material.append(-1.0 if value is None else number(value, name))
             if not material[-1] <= most:
                 raise ValueError(f"{name} is {material[-1]} where at most {most:g} is wanted")
-        self._on_cpu("set_material()").set_material(row, *material)
+        self._core.set_material(row, *material)
 
     def set_gravity_scale(self, body: int, gravity_scale: float) -> None:
         """Sets the part of gravity that acts on a body; 0: it floats. States keep it. Wakes as `set_material` does."""
-        self._on_cpu("set_gravity_scale()").set_gravity_scale(self._body(body), number(gravity_scale, "gravity_scale"))
+        self._core.set_gravity_scale(self._body(body), number(gravity_scale, "gravity_scale"))
 
     def add_joint(self, joint: Joint) -> int:
         """Joins bodies as they are now, and wakes them. Returns the joint's place in `joints`: the first from which a joint has been removed, or else one at the end.
@@ -379,8 +378,8 @@ class World:
         self._on_cpu("joints").set_motor(whole_number(joint, "joint", 0, NO_INDEX), number(speed, "speed"), number(most_effort, "most_effort"))
 
     def save(self) -> WorldState:
-        """Keeps all that the next steps depend on."""
-        return WorldState(self._on_cpu("save()").save())
+        """Keeps all that the next steps depend on: of a world on a GPU, in GPU memory."""
+        return WorldState(self._core.save())
 
     def restore(self, state: WorldState) -> None:
         """Goes back to a state of this world that was saved since its bodies were placed, else Error. There are no contacts until the next step.
@@ -394,11 +393,19 @@ class World:
         """
         if not isinstance(state, WorldState):
             raise TypeError(f"state is {type(state).__name__} where a tandem.WorldState is wanted")
-        self._on_cpu("restore()").restore(state._core)
+        try:
+            self._core.restore(state._core)  # type: ignore[arg-type]
+        except TypeError:
+            raise ValueError("state is of a world on another kind of device") from None
 
     def wake(self) -> None:
         """Wakes all bodies of a world on a GPU. Call it once you have written to `states`."""
         self._on_gpu("wake()").wake()
+
+    @property
+    def bytes(self) -> int:
+        """The GPU memory that a world on a GPU holds, but for its assets and states."""
+        return self._on_gpu("bytes").bytes()
 
     @property
     def states(self) -> _cuda.Array:
@@ -505,8 +512,8 @@ class World:
     @property
     def touching(self) -> Rows:
         """The pairs of bodies that touch in the last step, a copy, array of WORLD_TOUCH, ascending: at its start they had a contact that is no gap, or one of their
-        contacts pushed in it. Two bodies that sleep go on as they were. On a GPU it is an array of PAIR. `impulse` says how hard they pushed each other apart, in newton seconds, `position`
-        where the hardest contact is, and `speed` how fast they approached each other at the start of the step.
+        contacts pushed in it. Two bodies that sleep go on as they were. `impulse` says how hard they pushed each other apart, in newton seconds, `position` where the
+        hardest contact is, and `speed` how fast they approached each other at the start of the step.
 
         >>> world = tandem.World([box], translation=[[0, 0, 0], [0, 0, 1.01]], filter=tandem.Filter(motion=[tandem.FIXED, tandem.MOVING]))
         >>> for _ in range(5):
@@ -518,19 +525,19 @@ class World:
         [(0, 1)] began: []
         [(0, 1)] began: []
         """
-        return np.frombuffer(self._core.touching(), WORLD_TOUCH if isinstance(self._core, _tandem.World) else PAIR)
+        return np.frombuffer(self._core.touching(), WORLD_TOUCH)
 
     @property
     def began(self) -> Rows:
         """The pairs that came to touch in any of the steps of the last call of `step`, a copy, array of WORLD_TOUCH, ascending; a pair that bounced is in `ended` too.
         Each has the numbers of the step of the call, from when the pair began to touch, in which it pushed hardest, and the largest speed: an impact often takes two
         steps, the first of which lets the bodies come as far as they meet."""
-        return np.frombuffer(self._on_cpu("began").began(), WORLD_TOUCH)
+        return np.frombuffer(self._core.began(), WORLD_TOUCH)
 
     @property
     def ended(self) -> Rows:
         """The pairs that came to touch no longer in any of the steps of the last call of `step`, a copy, array of PAIR, ascending."""
-        return np.frombuffer(self._on_cpu("ended").ended(), PAIR)
+        return np.frombuffer(self._core.ended(), PAIR)
 
     @property
     def broken(self) -> npt.NDArray[np.uint32]:

@@ -10,11 +10,16 @@ using namespace tandem::c;
 
 struct tandem_gpu_world : WorldHandle<GpuWorld> {
   // Keeps CUDA's error, too.
+  tandem_status number_of(Status status) const { return c::told(status, world.cuda_error()); }
   tandem_status told(Status status) {
-    (void)c::told(status, world.cuda_error());
+    (void)number_of(status);
     return WorldHandle::told(status);
   }
 };
+
+struct tandem_gpu_world_state : WorldStateHandle<GpuWorld> {};
+
+TANDEM_WORLD_HANDLE(tandem_gpu_world, GpuWorld)
 
 namespace {
 
@@ -45,10 +50,6 @@ tandem_status tandem_gpu_world_create(const tandem_world_options* options, const
   });
 }
 
-void tandem_gpu_world_destroy(tandem_gpu_world* world) {
-  delete world;
-}
-
 tandem_status tandem_gpu_world_set_assets(tandem_gpu_world* world, tandem_asset* const* assets, size_t count,
                                           tandem_stream stream) {
   return set_world_assets(world, assets, count,
@@ -67,24 +68,17 @@ tandem_status tandem_gpu_world_set_bodies(tandem_gpu_world* world, const tandem_
       });
 }
 
-tandem_status tandem_gpu_world_step(tandem_gpu_world* world, double dt, uint32_t steps) {
-  return enter(world, [&](tandem_gpu_world& self) { return self.told(self.world.step(dt, steps)); });
-}
+// Defines the function that copies rows of a kind.
+#define TANDEM_GPU_WORLD_ROWS(name, row)                                                            \
+  tandem_status tandem_gpu_world_##name(tandem_gpu_world* world, const row** rows, size_t* count) { \
+    return copy_rows(world, &GpuWorld::name, rows, count);                                          \
+  }
 
-tandem_status tandem_gpu_world_bodies(tandem_gpu_world* world, const tandem_body_motion** bodies,
-                                      size_t* count) {
-  return copy_rows(world, &GpuWorld::bodies, bodies, count);
-}
-
-tandem_status tandem_gpu_world_contacts(tandem_gpu_world* world, const tandem_world_contact** contacts,
-                                        size_t* count) {
-  return copy_rows(world, &GpuWorld::contacts, contacts, count);
-}
-
-tandem_status tandem_gpu_world_touching(tandem_gpu_world* world, const tandem_object_pair** touching,
-                                        size_t* count) {
-  return copy_rows(world, &GpuWorld::touching, touching, count);
-}
+TANDEM_GPU_WORLD_ROWS(bodies, tandem_body_motion)
+TANDEM_GPU_WORLD_ROWS(contacts, tandem_world_contact)
+TANDEM_GPU_WORLD_ROWS(touching, tandem_world_touch)
+TANDEM_GPU_WORLD_ROWS(began, tandem_world_touch)
+TANDEM_GPU_WORLD_ROWS(ended, tandem_object_pair)
 
 tandem_gpu_body_state* tandem_gpu_world_states(const tandem_gpu_world* world, size_t* count) {
   if (count != nullptr) *count = world != nullptr ? world->world.body_count() : 0;
@@ -95,29 +89,6 @@ tandem_status tandem_gpu_world_wake(tandem_gpu_world* world) {
   return enter(world, [](tandem_gpu_world& self) { return self.told(self.world.wake()); });
 }
 
-tandem_status tandem_gpu_world_set_body(tandem_gpu_world* world, uint32_t body,
-                                        const tandem_body_motion* motion) {
-  return set_body(world, body, motion);
-}
-
-tandem_status tandem_gpu_world_push(tandem_gpu_world* world, uint32_t body, const double* impulse,
-                                    const double* at) {
-  return call_with_two(world, &GpuWorld::push, body, impulse, at);
-}
-
-tandem_status tandem_gpu_world_set_force(tandem_gpu_world* world, uint32_t body, const double* force,
-                                         const double* torque) {
-  return call_with_two(world, &GpuWorld::set_force, body, force, torque);
-}
-
-double tandem_gpu_world_time(const tandem_gpu_world* world) {
-  return world != nullptr ? world->world.time() : 0;
-}
-
-double tandem_gpu_world_mass(const tandem_gpu_world* world, uint32_t body) {
-  return world != nullptr ? world->world.mass_of(body) : 0;
-}
-
-uint64_t tandem_gpu_world_where(const tandem_gpu_world* world) {
-  return world != nullptr ? world->where : 0;
+size_t tandem_gpu_world_bytes(const tandem_gpu_world* world) {
+  return world != nullptr ? world->world.bytes() : 0;
 }

@@ -1057,6 +1057,9 @@ TANDEM_API tandem_status tandem_world_set_bodies(tandem_world* world, const tand
 /// questions take or has become faster than tandem_world_set_bodies() allows; TANDEM_OUT_OF_MEMORY. After an
 /// error bodies are as after the last step that was whole, and there are no contacts.
 TANDEM_API tandem_status tandem_world_step(tandem_world* world, double dt, uint32_t steps);
+/// Makes more steps, which tandem_world_began(), tandem_world_ended() and tandem_world_broken() take for
+/// steps of the last tandem_world_step(). Result: as of that.
+TANDEM_API tandem_status tandem_world_step_more(tandem_world* world, double dt, uint32_t steps);
 
 /// Where a body is, and how it moves.
 typedef struct tandem_body_motion {

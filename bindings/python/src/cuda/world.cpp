@@ -10,20 +10,12 @@ namespace {
 struct OnGpu {
   int device = 0;
 
-  using Handle = tandem_gpu_world;
-  static constexpr auto create = tandem_gpu_world_create;
-  static constexpr auto destroy = tandem_gpu_world_destroy;
-  static constexpr auto set_bodies = tandem_gpu_world_set_bodies;
-  static constexpr auto step = tandem_gpu_world_step;
+  TANDEM_WORLD_ENGINE(tandem_gpu_world);
   static constexpr auto bodies = tandem_gpu_world_bodies;
   static constexpr auto contacts = tandem_gpu_world_contacts;
   static constexpr auto touching = tandem_gpu_world_touching;
-  static constexpr auto set_body = tandem_gpu_world_set_body;
-  static constexpr auto push = tandem_gpu_world_push;
-  static constexpr auto set_force = tandem_gpu_world_set_force;
-  static constexpr auto time = tandem_gpu_world_time;
-  static constexpr auto mass = tandem_gpu_world_mass;
-  static constexpr auto where = tandem_gpu_world_where;
+  static constexpr auto began = tandem_gpu_world_began;
+  static constexpr auto ended = tandem_gpu_world_ended;
 
   static tandem_status set_assets(tandem_gpu_world* world, tandem_asset* const* assets, std::size_t count) {
     return tandem_gpu_world_set_assets(world, assets, count, nullptr);
@@ -58,12 +50,20 @@ class GpuWorld : public WorldOf<OnGpu> {
     const Turn turn = take_turn();
     ask(tandem_gpu_world_wake);
   }
+
+  std::size_t bytes() {
+    const Turn turn = take_turn();
+    return tandem_gpu_world_bytes(world());
+  }
 };
 
 }  // namespace
 
 void add_gpu_worlds(nb::module_& module) {
-  add_world<GpuWorld, int>(module).def("states", &GpuWorld::states).def("wake", &GpuWorld::wake);
+  add_world<GpuWorld, int>(module)
+      .def("states", &GpuWorld::states)
+      .def("wake", &GpuWorld::wake)
+      .def("bytes", &GpuWorld::bytes);
 }
 
 }  // namespace tandem::python

@@ -684,8 +684,8 @@ TANDEM_API size_t tandem_gpu_probe_query_bytes(const tandem_gpu_probe_query* que
 /// ---- Worlds on a GPU
 
 /// Rigid bodies that move on a GPU, by the rules of a tandem_world and from the same structs. Bodies,
-/// contacts and pairs stay in GPU memory. It has no joints, no continuous motion and no states to go back to,
-/// and all contacts are soft; docs/dynamics.md says what that means. The same calls give the same bytes on
+/// contacts and pairs stay in GPU memory. It has no joints and no continuous motion, and all contacts are
+/// soft; docs/dynamics.md says what that means. The same calls give the same bytes on
 /// GPUs of one kind, but not those of a tandem_world. A world takes one call at a time, and belongs to the
 /// device that was current when it was given its assets.
 typedef struct tandem_gpu_world tandem_gpu_world;
@@ -716,31 +716,56 @@ TANDEM_API tandem_status tandem_gpu_world_set_bodies(tandem_gpu_world* world,
                                                      const tandem_instance* instances, size_t count,
                                                      const tandem_pair_filter* filter,
                                                      const tandem_body_start* start);
-/// Makes steps of dt seconds, and waits for them. Result: as of tandem_world_step(). After an error bodies
-/// are as after the last step that was whole.
+/// Makes steps of dt seconds, and waits for them. Result: as of tandem_world_step(), and TANDEM_OUT_OF_RANGE
+/// too where the caller wrote to tandem_gpu_world_states() what no step can begin with. After an error bodies
+/// are as after the last step that was whole, and there are no contacts.
 TANDEM_API tandem_status tandem_gpu_world_step(tandem_gpu_world* world, double dt, uint32_t steps);
-/// Copy from the GPU what tandem_world_bodies(), tandem_world_contacts() and tandem_world_touching() return,
-/// though of pairs that touch the bodies alone: null and 0 where there are none, and after an error. Valid
-/// until the next call. count: or null.
+/// Makes more steps of the last call, as tandem_world_step_more().
+TANDEM_API tandem_status tandem_gpu_world_step_more(tandem_gpu_world* world, double dt, uint32_t steps);
+/// Copy from the GPU what tandem_world_bodies(), tandem_world_contacts(), tandem_world_touching(),
+/// tandem_world_began() and tandem_world_ended() return: null and 0 where there are none, and after an error.
+/// Valid until the next call. count: or null. What began and ended is followed on the GPU; lists are made
+/// when they are asked for.
 TANDEM_API tandem_status tandem_gpu_world_bodies(tandem_gpu_world* world, const tandem_body_motion** bodies,
                                                  size_t* count);
 TANDEM_API tandem_status tandem_gpu_world_contacts(tandem_gpu_world* world,
                                                    const tandem_world_contact** contacts, size_t* count);
 TANDEM_API tandem_status tandem_gpu_world_touching(tandem_gpu_world* world,
-                                                   const tandem_object_pair** touching, size_t* count);
+                                                   const tandem_world_touch** touching, size_t* count);
+TANDEM_API tandem_status tandem_gpu_world_began(tandem_gpu_world* world, const tandem_world_touch** began,
+                                                size_t* count);
+TANDEM_API tandem_status tandem_gpu_world_ended(tandem_gpu_world* world, const tandem_object_pair** ended,
+                                                size_t* count);
 /// Returns the state of each body, in GPU memory, as it is after the last step, and how many there are; null
 /// and 0 without bodies. It stays where it is until bodies are placed or assets are set. Who writes there
 /// calls tandem_gpu_world_wake() once that is done.
 TANDEM_API tandem_gpu_body_state* tandem_gpu_world_states(const tandem_gpu_world* world, size_t* count);
 /// Wakes all bodies.
 TANDEM_API tandem_status tandem_gpu_world_wake(tandem_gpu_world* world);
-/// Do what tandem_world_set_body(), tandem_world_push() and tandem_world_set_force() do.
+/// Do what tandem_world_set_body(), tandem_world_set_material(), tandem_world_set_gravity_scale(),
+/// tandem_world_push() and tandem_world_set_force() do.
 TANDEM_API tandem_status tandem_gpu_world_set_body(tandem_gpu_world* world, uint32_t body,
                                                    const tandem_body_motion* motion);
+TANDEM_API tandem_status tandem_gpu_world_set_material(tandem_gpu_world* world, uint32_t body,
+                                                       double friction, double restitution,
+                                                       double rolling_resistance);
+TANDEM_API tandem_status tandem_gpu_world_set_gravity_scale(tandem_gpu_world* world, uint32_t body,
+                                                            double gravity_scale);
 TANDEM_API tandem_status tandem_gpu_world_push(tandem_gpu_world* world, uint32_t body, const double* impulse,
                                                const double* at);
 TANDEM_API tandem_status tandem_gpu_world_set_force(tandem_gpu_world* world, uint32_t body,
                                                     const double* force, const double* torque);
+/// All that the next steps of a world depend on, beside options, assets and what bodies are, in GPU memory.
+typedef struct tandem_gpu_world_state tandem_gpu_world_state;
+
+/// Keeps the state of the world, goes back to it, and destroys its handle, as tandem_world_save() and its
+/// like do. The steps that follow have the same bytes.
+TANDEM_API tandem_status tandem_gpu_world_save(const tandem_gpu_world* world, tandem_gpu_world_state** state);
+TANDEM_API tandem_status tandem_gpu_world_restore(tandem_gpu_world* world,
+                                                  const tandem_gpu_world_state* state);
+TANDEM_API void tandem_gpu_world_state_destroy(tandem_gpu_world_state* state);
+/// Returns the bytes of GPU memory that the world holds, but for its assets and states.
+TANDEM_API size_t tandem_gpu_world_bytes(const tandem_gpu_world* world);
 /// Return what tandem_world_time(), tandem_world_mass() and tandem_world_where() do.
 TANDEM_API double tandem_gpu_world_time(const tandem_gpu_world* world);
 TANDEM_API double tandem_gpu_world_mass(const tandem_gpu_world* world, uint32_t body);

@@ -41,8 +41,9 @@ class GpuWorld {
   Status set_bodies(std::span<const BodyDescription> bodies, const WorldOptions& options = {},
                     std::span<const ObjectPair> excluded = {}, std::span<const JointDescription> joints = {});
 
-  /// Makes steps of dt seconds, and waits for them. Result: as of World::step(). After an error bodies are as
-  /// after the last step that was whole.
+  /// Makes steps of dt seconds, and waits for them. Result: as of World::step(), and kOutOfRange too where
+  /// somebody wrote to states() what no step can begin with. After an error bodies are as after the last step
+  /// that was whole, and there are no contacts.
   Status step(double dt, std::uint32_t steps = 1);
 
   /// Makes more steps of the last call, see World::step_more(). Result: as of step().

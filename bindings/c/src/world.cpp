@@ -71,21 +71,3 @@ const tandem_world_joint* tandem_world_joints(const tandem_world* world, size_t*
 const uint32_t* tandem_world_broken(const tandem_world* world, size_t* count) {
   return rows_of<uint32_t>(world, &World::broken, count);
 }
-
-tandem_status tandem_world_add_joint(tandem_world* world, const tandem_joint* joint, uint32_t* place) {
-  return enter(world, [&](tandem_world& self) -> tandem_status {
-    if (joint == nullptr || place == nullptr) return TANDEM_NULL_ARGUMENT;
-    JointDescription read;
-    const tandem_status status = read_joint(*joint, read);
-    return status == TANDEM_OK ? self.told(self.world.add_joint(read, *place)) : status;
-  });
-}
-
-tandem_status tandem_world_remove_joint(tandem_world* world, uint32_t joint) {
-  return enter(world, [&](tandem_world& self) { return self.told(self.world.remove_joint(joint)); });
-}
-
-tandem_status tandem_world_set_motor(tandem_world* world, uint32_t joint, double speed, double most_effort) {
-  return enter(
-      world, [&](tandem_world& self) { return self.told(self.world.set_motor(joint, speed, most_effort)); });
-}

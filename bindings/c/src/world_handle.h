@@ -95,6 +95,16 @@ tandem_status call_with_two(Handle* world, Function call, uint32_t body, const d
   });
 }
 
+template <typename Handle>
+tandem_status add_joint(Handle* world, const tandem_joint* joint, uint32_t* place) noexcept {
+  return enter(world, [&](Handle& self) -> tandem_status {
+    if (joint == nullptr || place == nullptr) return TANDEM_NULL_ARGUMENT;
+    JointDescription read;
+    const tandem_status status = read_joint(*joint, read);
+    return status == TANDEM_OK ? self.told(self.world.add_joint(read, *place)) : status;
+  });
+}
+
 /// Keeps the state of a world by its allocator.
 template <typename Handle, typename State>
 tandem_status save_state(const Handle* world, State** state) noexcept {
@@ -151,6 +161,16 @@ tandem_status restore_state(Handle* world, const State* state) noexcept {
   }                                                                                                       \
   tandem_status of##_set_force(of* world, uint32_t body, const double* force, const double* torque) {     \
     return call_with_two(world, &Of::set_force, body, force, torque);                                     \
+  }                                                                                                       \
+  tandem_status of##_add_joint(of* world, const tandem_joint* joint, uint32_t* place) {                   \
+    return add_joint(world, joint, place);                                                                \
+  }                                                                                                       \
+  tandem_status of##_remove_joint(of* world, uint32_t joint) {                                            \
+    return enter(world, [&](of& self) { return self.told(self.world.remove_joint(joint)); });             \
+  }                                                                                                       \
+  tandem_status of##_set_motor(of* world, uint32_t joint, double speed, double most_effort) {             \
+    return enter(world,                                                                                   \
+                 [&](of& self) { return self.told(self.world.set_motor(joint, speed, most_effort)); });   \
   }                                                                                                       \
   tandem_status of##_save(const of* world, of##_state** state) {                                          \
     return save_state(world, state);                                                                      \

@@ -68,6 +68,9 @@ inline tandem_world_options options_of(const GivenOptions& given) {
   static constexpr auto set_gravity_scale = of##_set_gravity_scale; \
   static constexpr auto push = of##_push;                           \
   static constexpr auto set_force = of##_set_force;                 \
+  static constexpr auto add_joint = of##_add_joint;                 \
+  static constexpr auto remove_joint = of##_remove_joint;           \
+  static constexpr auto set_motor = of##_set_motor;                 \
   static constexpr auto save = of##_save;                           \
   static constexpr auto restore = of##_restore;                     \
   static constexpr auto state_destroy = of##_state_destroy;         \
@@ -95,7 +98,8 @@ class WorldState {
 /// A world of the C interface, on the CPU or on a GPU. Engine has the functions of its kind of world: those
 /// of TANDEM_WORLD_ENGINE, and as static members
 ///   set_assets(world, assets, count), count(world);   the latter of bodies
-///   bodies, contacts, touching, began, ended;   these return a tandem_status of (world, &rows, &count)
+///   bodies, contacts, touching, began, ended, joints, broken;   these return a tandem_status of (world,
+///   &rows, &count)
 /// and here(), not static, returns what lives during a call.
 template <typename Engine>
 class WorldOf {
@@ -170,6 +174,23 @@ class WorldOf {
     ask([&](Handle* world) { return Engine::set_gravity_scale(world, body, scale); });
   }
 
+  std::uint32_t add_joint(nb::handle joint) {
+    const Turn turn = take_turn();
+    const auto rows = copy_rows<tandem_joint>(joint);
+    if (rows.size() != 1) throw_broken_rows();
+    std::uint32_t place = 0;
+    ask([&](Handle* world) { return Engine::add_joint(world, rows.data(), &place); });
+    return place;
+  }
+  void remove_joint(std::uint32_t joint) {
+    const Turn turn = take_turn();
+    ask([&](Handle* world) { return Engine::remove_joint(world, joint); });
+  }
+  void set_motor(std::uint32_t joint, double speed, double most_effort) {
+    const Turn turn = take_turn();
+    ask([&](Handle* world) { return Engine::set_motor(world, joint, speed, most_effort); });
+  }
+
   State save() {
     const Turn turn = take_turn();
     typename Engine::StateHandle* state = nullptr;
@@ -193,6 +214,8 @@ class WorldOf {
   nb::object touching() { return rows(Engine::touching); }
   nb::object began() { return rows(Engine::began); }
   nb::object ended() { return rows(Engine::ended); }
+  nb::object joints() { return rows(Engine::joints); }
+  nb::object broken() { return rows(Engine::broken); }
 
   std::size_t count() {
     const Turn turn = take_turn();
@@ -307,6 +330,11 @@ nb::class_<Of> add_world(nb::module_& module) {
       .def("touching", &Of::touching)
       .def("began", &Of::began)
       .def("ended", &Of::ended)
+      .def("joints", &Of::joints)
+      .def("broken", &Of::broken)
+      .def("add_joint", &Of::add_joint)
+      .def("remove_joint", &Of::remove_joint)
+      .def("set_motor", &Of::set_motor)
       .def("save", &Of::save)
       .def("restore", &Of::restore)
       .def("count", &Of::count)

@@ -145,10 +145,6 @@ def _material(value: npt.ArrayLike | None, name: str, bodies: int, most: float =
     return given
 
 
-def _missing(what: str) -> NotImplementedError:
-    return NotImplementedError(f"a world on a GPU has no {what} yet: that is of device='cpu'")
-
-
 def _core(gpu: int | None, assets: list[_tandem.Asset], gravity: _Numbers, friction: float, restitution: float, slop: float | None, lever: float | None,
           substeps: int, sleeping: bool, continuous: bool, threads: int) -> _tandem.World | _cuda.World:
     """What moves the bodies: the CPU, or the GPU of a number."""
@@ -156,7 +152,7 @@ def _core(gpu: int | None, assets: list[_tandem.Asset], gravity: _Numbers, frict
     if gpu is None:
         return _tandem.World(*options)
     if continuous:
-        raise _missing("continuous motion")
+        raise NotImplementedError("a world on a GPU has no continuous motion yet: that is of device='cpu'")
     from . import cuda  # says why it is not there
 
     return cuda.WorldCore(*options, gpu)
@@ -181,7 +177,7 @@ class World:
         threads: that a call may use, 1 to 1,024, the caller's thread included. Results do not depend on it. Not looked at on a GPU.
         device: "cpu", or "cuda" or "cuda:1", the GPU on which the bodies move.
 
-    On a GPU bodies move by the same rules, but all contacts are soft, and there are no joints and no continuous motion, which raise NotImplementedError. Results
+    On a GPU bodies move by the same rules, but all contacts and joints are soft, and there is no continuous motion, which raises NotImplementedError. Results
     are arrays in CPU memory, as on the CPU, and `states` lies in GPU memory. The same calls give the same bytes on GPUs of one kind, but not those of the CPU.
 
     Calls let other Python threads run. A world takes one call at a time: a second thread gets RuntimeError; several worlds may share assets.
@@ -246,8 +242,6 @@ class World:
                  _material(restitution, "restitution", len(bodies), 1.0), _material(rolling_resistance, "rolling_resistance", len(bodies)),
                  _of_each(gravity_scale, "gravity_scale", len(bodies)))
         joined = _joint_rows(joints)
-        if joints:
-            self._on_cpu("joints")
         self._asset, self._filter = np.zeros(0, np.uint32), None
         try:
             self._core.set_bodies(bodies, _core_of(filter), *given, joined)
@@ -366,16 +360,16 @@ class World:
         >>> world.velocity.round(2).tolist()
         [[0.0, 0.0, -9.81]]
         """
-        return self._on_cpu("joints").add_joint(_joint_rows([joint]))
+        return self._core.add_joint(_joint_rows([joint]))
 
     def remove_joint(self, joint: int) -> None:
         """Removes a joint, broken or not, and wakes the bodies. Others keep their places. Error, where `where` is the joint: there is none such."""
-        self._on_cpu("joints").remove_joint(whole_number(joint, "joint", 0, NO_INDEX))
+        self._core.remove_joint(whole_number(joint, "joint", 0, NO_INDEX))
 
     def set_motor(self, joint: int, speed: float, most_effort: float) -> None:
         """Gives the motor of a hinge or slider another speed and greatest torque or force, and wakes the bodies. Error, where `where` is the joint: there is none
         such, it has broken, or it has no motor."""
-        self._on_cpu("joints").set_motor(whole_number(joint, "joint", 0, NO_INDEX), number(speed, "speed"), number(most_effort, "most_effort"))
+        self._core.set_motor(whole_number(joint, "joint", 0, NO_INDEX), number(speed, "speed"), number(most_effort, "most_effort"))
 
     def save(self) -> WorldState:
         """Keeps all that the next steps depend on: of a world on a GPU, in GPU memory."""
@@ -419,12 +413,6 @@ class World:
             world.wake()
         """
         return self._on_gpu("states").states()
-
-    def _on_cpu(self, what: str) -> _tandem.World:
-        """What moves the bodies, if it is the CPU; NotImplementedError names what a GPU has not."""
-        if not isinstance(self._core, _tandem.World):
-            raise _missing(what)
-        return self._core
 
     def _on_gpu(self, what: str) -> _cuda.World:
         if isinstance(self._core, _tandem.World):
@@ -543,7 +531,7 @@ class World:
     def broken(self) -> npt.NDArray[np.uint32]:
         """The joints that broke in any of the steps of the last call of `step`, a copy, ascending. A broken joint keeps its place until it is removed, and its bodies may
         touch from the next step on."""
-        return np.frombuffer(self._on_cpu("joints").broken(), np.uint32)
+        return np.frombuffer(self._core.broken(), np.uint32)
 
     @property
     def joints(self) -> Rows:
@@ -556,7 +544,7 @@ class World:
         >>> world.joints["speed"].round(3).tolist()
         [2.0]
         """
-        return np.frombuffer(self._on_cpu("joints").joints(), WORLD_JOINT)
+        return np.frombuffer(self._core.joints(), WORLD_JOINT)
 
     @property
     def time(self) -> float:

@@ -63,8 +63,7 @@ tandem_status tandem_gpu_world_set_bodies(tandem_gpu_world* world, const tandem_
                                           const tandem_body_start* start) {
   return place_bodies(
       world, instances, count, filter, start, [](tandem_gpu_world& self, const GivenBodies& given) {
-        return given.joints.empty() ? self.world.set_bodies(given.bodies, self.options, given.excluded)
-                                    : Status::kBadOption;
+        return self.world.set_bodies(given.bodies, self.options, given.excluded, given.joints);
       });
 }
 
@@ -79,6 +78,8 @@ TANDEM_GPU_WORLD_ROWS(contacts, tandem_world_contact)
 TANDEM_GPU_WORLD_ROWS(touching, tandem_world_touch)
 TANDEM_GPU_WORLD_ROWS(began, tandem_world_touch)
 TANDEM_GPU_WORLD_ROWS(ended, tandem_object_pair)
+TANDEM_GPU_WORLD_ROWS(joints, tandem_world_joint)
+TANDEM_GPU_WORLD_ROWS(broken, uint32_t)
 
 tandem_gpu_body_state* tandem_gpu_world_states(const tandem_gpu_world* world, size_t* count) {
   if (count != nullptr) *count = world != nullptr ? world->world.body_count() : 0;

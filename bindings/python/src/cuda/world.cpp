@@ -16,6 +16,8 @@ struct OnGpu {
   static constexpr auto touching = tandem_gpu_world_touching;
   static constexpr auto began = tandem_gpu_world_began;
   static constexpr auto ended = tandem_gpu_world_ended;
+  static constexpr auto joints = tandem_gpu_world_joints;
+  static constexpr auto broken = tandem_gpu_world_broken;
 
   static tandem_status set_assets(tandem_gpu_world* world, tandem_asset* const* assets, std::size_t count) {
     return tandem_gpu_world_set_assets(world, assets, count, nullptr);

@@ -684,10 +684,10 @@ TANDEM_API size_t tandem_gpu_probe_query_bytes(const tandem_gpu_probe_query* que
 /// ---- Worlds on a GPU
 
 /// Rigid bodies that move on a GPU, by the rules of a tandem_world and from the same structs. Bodies,
-/// contacts and pairs stay in GPU memory. It has no joints and no continuous motion, and all contacts are
-/// soft; docs/dynamics.md says what that means. The same calls give the same bytes on
-/// GPUs of one kind, but not those of a tandem_world. A world takes one call at a time, and belongs to the
-/// device that was current when it was given its assets.
+/// contacts and pairs stay in GPU memory. It has no continuous motion, and all contacts and joints are soft;
+/// docs/dynamics.md says what that means. The same calls give the same bytes on GPUs of one kind, but not
+/// those of a tandem_world. A world takes one call at a time, and belongs to the device that was current when
+/// it was given its assets.
 typedef struct tandem_gpu_world tandem_gpu_world;
 
 /// How a body stands and moves, in GPU memory: 13 numbers.
@@ -710,8 +710,7 @@ TANDEM_API void tandem_gpu_world_destroy(tandem_gpu_world* world);
 TANDEM_API tandem_status tandem_gpu_world_set_assets(tandem_gpu_world* world, tandem_asset* const* assets,
                                                      size_t count, tandem_stream stream);
 /// Places all bodies anew, at time 0. The arguments lie in CPU memory. Result: as of
-/// tandem_world_set_bodies(), and TANDEM_BAD_OPTION where `start` has joints. After an error there are no
-/// bodies.
+/// tandem_world_set_bodies(). After an error there are no bodies.
 TANDEM_API tandem_status tandem_gpu_world_set_bodies(tandem_gpu_world* world,
                                                      const tandem_instance* instances, size_t count,
                                                      const tandem_pair_filter* filter,
@@ -723,9 +722,9 @@ TANDEM_API tandem_status tandem_gpu_world_step(tandem_gpu_world* world, double d
 /// Makes more steps of the last call, as tandem_world_step_more().
 TANDEM_API tandem_status tandem_gpu_world_step_more(tandem_gpu_world* world, double dt, uint32_t steps);
 /// Copy from the GPU what tandem_world_bodies(), tandem_world_contacts(), tandem_world_touching(),
-/// tandem_world_began() and tandem_world_ended() return: null and 0 where there are none, and after an error.
-/// Valid until the next call. count: or null. What began and ended is followed on the GPU; lists are made
-/// when they are asked for.
+/// tandem_world_began(), tandem_world_ended(), tandem_world_joints() and tandem_world_broken() return: null
+/// and 0 where there are none, and after an error. Valid until the next call. count: or null. What began and
+/// ended is followed on the GPU; lists are made when they are asked for.
 TANDEM_API tandem_status tandem_gpu_world_bodies(tandem_gpu_world* world, const tandem_body_motion** bodies,
                                                  size_t* count);
 TANDEM_API tandem_status tandem_gpu_world_contacts(tandem_gpu_world* world,
@@ -736,6 +735,16 @@ TANDEM_API tandem_status tandem_gpu_world_began(tandem_gpu_world* world, const t
                                                 size_t* count);
 TANDEM_API tandem_status tandem_gpu_world_ended(tandem_gpu_world* world, const tandem_object_pair** ended,
                                                 size_t* count);
+TANDEM_API tandem_status tandem_gpu_world_joints(tandem_gpu_world* world, const tandem_world_joint** joints,
+                                                 size_t* count);
+TANDEM_API tandem_status tandem_gpu_world_broken(tandem_gpu_world* world, const uint32_t** broken,
+                                                 size_t* count);
+/// Do what tandem_world_add_joint(), tandem_world_remove_joint() and tandem_world_set_motor() do.
+TANDEM_API tandem_status tandem_gpu_world_add_joint(tandem_gpu_world* world, const tandem_joint* joint,
+                                                    uint32_t* place);
+TANDEM_API tandem_status tandem_gpu_world_remove_joint(tandem_gpu_world* world, uint32_t joint);
+TANDEM_API tandem_status tandem_gpu_world_set_motor(tandem_gpu_world* world, uint32_t joint, double speed,
+                                                    double most_effort);
 /// Returns the state of each body, in GPU memory, as it is after the last step, and how many there are; null
 /// and 0 without bodies. It stays where it is until bodies are placed or assets are set. Who writes there
 /// calls tandem_gpu_world_wake() once that is done.

@@ -175,12 +175,15 @@ static void test_a_world(tandem_asset* cube) {
   CHECK_STATUS(tandem_gpu_world_set_bodies(world, NULL, 1, NULL, NULL), TANDEM_NULL_ARGUMENT);
   CHECK_STATUS(tandem_gpu_world_set_bodies(world, &body, 1, NULL, &start), TANDEM_BAD_JOINT);
   joint.kind = TANDEM_BALL;
-  CHECK_STATUS(tandem_gpu_world_set_bodies(world, &body, 1, NULL, &start), TANDEM_BAD_OPTION);
+  CHECK_STATUS(tandem_gpu_world_set_bodies(world, &body, 1, NULL, &start), TANDEM_UNKNOWN_ASSET);
 
   const tandem_body_motion* bodies = (const tandem_body_motion*)&body;
   const tandem_world_contact* contacts = NULL;
   const tandem_world_touch* touching = NULL;
   const tandem_object_pair* ended = NULL;
+  const tandem_world_joint* joints = NULL;
+  const uint32_t* broken = NULL;
+  uint32_t place = 0;
   tandem_gpu_world_state* state = NULL;
   const double vector[] = {0, 0, 0};
   const tandem_body_motion motion = {.pose = body.pose};
@@ -193,6 +196,14 @@ static void test_a_world(tandem_asset* cube) {
   CHECK_STATUS(tandem_gpu_world_began(world, &touching, NULL), TANDEM_OK);
   CHECK_STATUS(tandem_gpu_world_ended(world, &ended, NULL), TANDEM_OK);
   CHECK(touching == NULL && ended == NULL);
+  CHECK_STATUS(tandem_gpu_world_joints(world, &joints, NULL), TANDEM_OK);
+  CHECK_STATUS(tandem_gpu_world_broken(world, &broken, NULL), TANDEM_OK);
+  CHECK(joints == NULL && broken == NULL);
+  CHECK_STATUS(tandem_gpu_world_add_joint(world, &joint, &place), TANDEM_UNKNOWN_INSTANCE);
+  CHECK_STATUS(tandem_gpu_world_add_joint(world, NULL, &place), TANDEM_NULL_ARGUMENT);
+  CHECK_STATUS(tandem_gpu_world_remove_joint(world, 0), TANDEM_BAD_JOINT);
+  CHECK_STATUS(tandem_gpu_world_set_motor(world, 4, 1, 1), TANDEM_BAD_JOINT);
+  CHECK(tandem_gpu_world_where(world) == 4);
   count = 7;
   CHECK(tandem_gpu_world_states(world, &count) == NULL && count == 0);
   CHECK_STATUS(tandem_gpu_world_step(world, 0, 1), TANDEM_BAD_DURATION);
@@ -221,6 +232,9 @@ static void test_a_world(tandem_asset* cube) {
   CHECK_STATUS(tandem_gpu_world_step(NULL, 1, 1), TANDEM_NULL_ARGUMENT);
   CHECK_STATUS(tandem_gpu_world_step_more(NULL, 1, 1), TANDEM_NULL_ARGUMENT);
   CHECK_STATUS(tandem_gpu_world_restore(NULL, NULL), TANDEM_NULL_ARGUMENT);
+  CHECK_STATUS(tandem_gpu_world_add_joint(NULL, &joint, &place), TANDEM_NULL_ARGUMENT);
+  CHECK_STATUS(tandem_gpu_world_remove_joint(NULL, 0), TANDEM_NULL_ARGUMENT);
+  CHECK_STATUS(tandem_gpu_world_set_motor(NULL, 0, 1, 1), TANDEM_NULL_ARGUMENT);
   CHECK_STATUS(tandem_gpu_world_bodies(NULL, &bodies, &count), TANDEM_NULL_ARGUMENT);
   CHECK_STATUS(tandem_gpu_world_wake(NULL), TANDEM_NULL_ARGUMENT);
   CHECK(tandem_gpu_world_states(NULL, &count) == NULL && count == 0);

@@ -193,8 +193,9 @@ static void test_wrong_calls(void) {
   CHECK_STATUS(tandem_gpu_world_set_bodies(world, bodies, 2, NULL, &start), TANDEM_NO_MASS);
   CHECK(tandem_gpu_world_where(world) == 1);
   CHECK(tandem_gpu_world_states(world, &count) == NULL && count == 0);
+  joint.b = 0;
   start = (tandem_body_start){.struct_size = sizeof start, .joints = &joint, .joint_count = 1};
-  CHECK_STATUS(tandem_gpu_world_set_bodies(world, bodies, 2, NULL, &start), TANDEM_BAD_OPTION);
+  CHECK_STATUS(tandem_gpu_world_set_bodies(world, bodies, 2, NULL, &start), TANDEM_JOINS_NOTHING);
   bodies[1].asset = 1;
   CHECK_STATUS(tandem_gpu_world_set_bodies(world, bodies, 2, NULL, NULL), TANDEM_UNKNOWN_ASSET);
   CHECK_STATUS(tandem_gpu_world_set_bodies(world, NULL, 0, NULL, NULL), TANDEM_OK);
@@ -263,6 +264,64 @@ static void test_a_filter(void) {
   tandem_gpu_world_destroy(world);
 }
 
+static const tandem_world_joint* joints_of(tandem_gpu_world* world, size_t count) {
+  const tandem_world_joint* joints = NULL;
+  size_t found = 0;
+  CHECK_STATUS(tandem_gpu_world_joints(world, &joints, &found), TANDEM_OK);
+  CHECK(found == count && joints != NULL);
+  if (found != count) exit(1);
+  return joints;
+}
+
+static size_t broken_of(tandem_gpu_world* world) {
+  const uint32_t* broken = NULL;
+  size_t count = 0;
+  CHECK_STATUS(tandem_gpu_world_broken(world, &broken, &count), TANDEM_OK);
+  CHECK(count == 0 || (broken != NULL && broken[0] == 0));
+  return count;
+}
+
+// A box turns on a hinge by a motor, hangs on it, and tears it off.
+static void test_joints(void) {
+  const tandem_instance body = at(0, 0, 5);
+  const double up[] = {0, 0, 2e6}, none[] = {0, 0, 0};
+  tandem_joint joint = {.kind = TANDEM_HINGE,
+                        .a = TANDEM_NO_INDEX,
+                        .anchor = {0, 0, 5},
+                        .axis = {0, 0, 2},
+                        .speed = 2,
+                        .most_effort = 1e6};
+  const tandem_body_start start = {.struct_size = sizeof start, .joints = &joint, .joint_count = 1};
+  tandem_gpu_world* world = NULL;
+  uint32_t place = 7;
+  CHECK_STATUS(tandem_gpu_world_create(NULL, NULL, &world), TANDEM_OK);
+  CHECK_STATUS(tandem_gpu_world_set_assets(world, &box, 1, NULL), TANDEM_OK);
+  CHECK_STATUS(tandem_gpu_world_set_bodies(world, &body, 1, NULL, &start), TANDEM_OK);
+  CHECK_STATUS(tandem_gpu_world_step(world, 1.0 / 60, 60), TANDEM_OK);
+  CHECK(fabs(joints_of(world, 1)->speed - 2) < 1e-3 && fabs(joints_of(world, 1)->position - 2) < 0.05);
+  CHECK_STATUS(tandem_gpu_world_set_motor(world, 0, -1, 1e6), TANDEM_OK);
+  CHECK_STATUS(tandem_gpu_world_step(world, 1.0 / 60, 2), TANDEM_OK);
+  CHECK(fabs(joints_of(world, 1)->speed + 1) < 1e-2);
+  CHECK_STATUS(tandem_gpu_world_remove_joint(world, 0), TANDEM_OK);
+  CHECK_STATUS(tandem_gpu_world_remove_joint(world, 0), TANDEM_BAD_JOINT);
+  CHECK_STATUS(tandem_gpu_world_set_motor(world, 0, 1, 1), TANDEM_BAD_JOINT);
+  CHECK(joints_of(world, 1)->holds == 0);
+  joint.breaking_force = 1e6;
+  CHECK_STATUS(tandem_gpu_world_add_joint(world, &joint, NULL), TANDEM_NULL_ARGUMENT);
+  CHECK_STATUS(tandem_gpu_world_add_joint(world, &joint, &place), TANDEM_OK);
+  CHECK(place == 0 && joints_of(world, 1)->holds == 1);
+  CHECK_STATUS(tandem_gpu_world_step(world, 1.0 / 60, 30), TANDEM_OK);
+  CHECK(joints_of(world, 1)->holds == 1 && broken_of(world) == 0);
+  CHECK_STATUS(tandem_gpu_world_set_force(world, 0, up, none), TANDEM_OK);
+  CHECK_STATUS(tandem_gpu_world_step(world, 1.0 / 60, 2), TANDEM_OK);
+  CHECK(joints_of(world, 1)->holds == 0 && broken_of(world) == 1);
+  CHECK_STATUS(tandem_gpu_world_step(world, 1.0 / 60, 1), TANDEM_OK);
+  CHECK(broken_of(world) == 0);
+  joint.kind = 9;
+  CHECK_STATUS(tandem_gpu_world_add_joint(world, &joint, &place), TANDEM_BAD_JOINT);
+  tandem_gpu_world_destroy(world);
+}
+
 int main(int argc, char** argv) {
   if (argc != 2) return printf("usage: gpu_world_use_test ASSETS_FOLDER\n"), 1;
   if (!has_gpu()) return printf("there is no GPU\n"), NO_GPU;
@@ -273,6 +332,7 @@ int main(int argc, char** argv) {
   test_states_in_place();
   test_going_back();
   test_a_filter();
+  test_joints();
   test_wrong_calls();
   tandem_asset_release(box);
   return failures != 0;

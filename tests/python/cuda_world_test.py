@@ -253,7 +253,7 @@ def test_no_bodies():
     world = tandem.World([BOX], device="cuda")
     world.step(1 / 60, 3)
     world.wake()
-    assert len(world.bodies) == len(world.contacts) == len(world.touching) == len(world.began) == len(world.ended) == len(world.mass) == 0 and world.states.shape == (0, 13)
+    assert len(world.bodies) == len(world.contacts) == len(world.touching) == len(world.began) == len(world.ended) == len(world.joints) == len(world.mass) == 0 and world.states.shape == (0, 13)
     world.place(translation=[0, 0, 1]).step(1 / 60)
     assert world.translation[0, 2] < 1
     world.place(translation=np.zeros((0, 3))).step(1 / 60)
@@ -261,20 +261,13 @@ def test_no_bodies():
 
 
 @needs_gpu
-@pytest.mark.parametrize("call, missing", [
-    (lambda w: w.place(translation=np.zeros(3), joints=[tandem.Joint("ball", None, 0, anchor=[0, 0, 0])]), "joints"),
-    (lambda w: w.add_joint(tandem.Joint("ball", None, 0, anchor=[0, 0, 0])), "joints"),
-    (lambda w: w.remove_joint(0), "joints"),
-    (lambda w: w.set_motor(0, 1, 1), "joints"),
-    (lambda w: w.joints, "joints"),
-    (lambda w: w.broken, "joints"),
-])
-def test_what_is_missing_is_named(call, missing):
-    world = floating()
-    with pytest.raises(NotImplementedError, match=f"a world on a GPU has no {missing} yet"):
-        call(world)
-    world.step(1 / 60)
-    assert len(world.bodies) == 2
+def test_joints_hold_and_motors_turn():
+    worlds.expect_that_joints_hold_and_motors_turn(BOX, "cuda", within=1e-3)
+
+
+@needs_gpu
+def test_joints_come_go_and_break():
+    worlds.expect_that_joints_come_go_and_break(BOX, "cuda", within=1e-3)
 
 
 @needs_gpu
@@ -284,6 +277,8 @@ def test_what_is_missing_is_named(call, missing):
     (lambda w: w.place(translation=np.zeros(3), filter=tandem.Filter(excluded=[[0, 5]])), "pair 0"),
     (lambda w: tandem.World([BOX, tandem.build(*solids.box(1, 1, 1), topology=False)], device="cuda"), "asset 1"),
     (lambda w: w.push(1, [0, 0, np.nan]), "not finite"),
+    (lambda w: w.remove_joint(0), "no such joint"),
+    (lambda w: w.set_motor(0, 1, 1), "no such joint"),
     (lambda w: w.set_force(1, [1e300, 0, 0]), "instance 1: .*too large"),
     (lambda w: w.move(1, rotation=3 * np.eye(3)), "instance 1: .*scales by 3"),
 ])

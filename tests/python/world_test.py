@@ -176,50 +176,11 @@ def test_what_touches_is_told():
 
 
 def test_joints_hold_and_motors_turn():
-    joints = [tandem.Joint("fixed", None, 0, anchor=[0, 0, 0]),
-              tandem.Joint("hinge", 0, 1, anchor=[0.2, 0.1, 1.0], axis=[0, 0, 3], limits=(-1, 7), speed=2, most_effort=1e6)]
-    world = tandem.World([BOX], translation=[[0, 0, 0], [0.2, 0.1, 1.0]], joints=joints)
-    world.step(1 / 60, 60)
-    assert len(world.contacts) == 0
-    assert np.allclose(world.translation, [[0, 0, 0], [0.2, 0.1, 1]], atol=1e-6)
-    assert np.allclose(world.joints["position"], [0, 2], atol=0.02) and np.allclose(world.joints["speed"], [0, 2])
-    world.set_motor(1, -3, 1e6)
-    world.step(1 / 60, 2)
-    assert np.allclose(world.angular_velocity[1], [0, 0, -3])
-    with pytest.raises(tandem.Error, match="no such joint"):
-        world.set_motor(0, 1, 1)
-    with pytest.raises(tandem.Error, match="axis"):
-        world.place(translation=[0, 0, 0], joints=[tandem.Joint("slider", 0, None, anchor=[0, 0, 0], axis=[0, 0, 0])])
-    with pytest.raises(ValueError, match="kind is 'rope'"):
-        world.place(translation=[0, 0, 0], joints=[tandem.Joint("rope", 0, None, anchor=[0, 0, 0])])
+    worlds.expect_that_joints_hold_and_motors_turn(BOX, "cpu", within=1e-6)
 
 
 def test_joints_come_go_and_break():
-    world = tandem.World([BOX], translation=[[0, 0, 0], [0, 0, 1]], filter=FIRST_FIXED)
-    world.step(1 / 60, 60)
-    assert world.sleeping[1] and len(world.joints) == 0
-    weight = 9.81 * world.mass[1]
-    kept = world.save()
-    assert world.add_joint(tandem.Joint("fixed", 0, 1, anchor=[0, 0, 0.5], breaking_force=2 * weight)) == 0
-    assert world.joints["holds"].tolist() == [1] and not world.sleeping[1]
-    world.set_force(1, [0, 0, 2.9 * weight])
-    world.step(1 / 60, 30)
-    assert len(world.touching) == len(world.broken) == 0 and (abs(world.velocity) < 1e-6).all()
-    world.set_force(1, [0, 0, 3.1 * weight])
-    world.step(1 / 60, 61)
-    assert world.broken.tolist() == [0] and world.joints["holds"].tolist() == [0]
-    assert world.velocity[1, 2] == pytest.approx(2.1 * 9.81)
-    world.step(1 / 60)
-    assert len(world.broken) == 0
-    world.remove_joint(0)
-    with pytest.raises(tandem.Error, match="no such joint"):
-        world.remove_joint(0)
-    with pytest.raises(tandem.Error, match="nothing"):
-        world.add_joint(tandem.Joint("ball", 0, None, anchor=[0, 0, 0]))
-    with pytest.raises(ValueError, match="breaking_torque is 0"):
-        world.add_joint(tandem.Joint("ball", 1, None, anchor=[0, 0, 0], breaking_torque=0))
-    world.restore(kept)
-    assert len(world.joints) == 0 and world.sleeping[1]
+    worlds.expect_that_joints_come_go_and_break(BOX, "cpu", within=1e-6)
 
 
 def test_materials_and_gravity_change():

@@ -48,6 +48,12 @@ struct GpuWorld::Parts {
   std::vector<BodyProperties> properties;
   GpuArray<std::uint32_t> group, mask, world;
   GpuExcludedPairs excluded;
+
+  // These are for continuous motion, which the CPU limits.
+  std::vector<std::uint32_t> host_group, host_mask, host_world;
+  ExcludedPairTable host_excluded;
+  PairFilter host_filter;                        // of the above
+  std::unique_ptr<ContinuousMotion> continuous;  // null: nothing limits it
   ParallelOptions options;
   bool has_contacts = false;  // those of the last step are there
   double time = 0;
@@ -73,11 +79,12 @@ struct GpuWorld::Parts {
 
   bool has_bodies() const { return simulation.has_value() && !properties.empty(); }
   void clear() {
-    simulation.reset(), placed.reset();
+    simulation.reset(), placed.reset(), continuous.reset();
     properties.clear();
     has_contacts = false, time = 0, where = 0;
   }
   Status upload_filter(const WorldSetup& setup, std::span<const ObjectPair> excluded_pairs);
+  Status step(double dt, std::uint64_t& blamed);
   Status read_contacts();
   Status read_state(std::uint32_t body, BodyState& state);
   template <typename Row, typename Get>
@@ -150,11 +157,14 @@ Status GpuWorld::set_bodies(std::span<const BodyDescription> bodies, const World
     WorldSetup setup;
     std::uint64_t blamed = 0;
     Status status = set_up(parts.assets, bodies, options, {}, setup, blamed);
-    if (status == Status::kOk && options.continuous) status = Status::kBadOption;
     if (status != Status::kOk) return fail(status, blamed);
-    parts.options = {setup.options.gravity, setup.options.solver, setup.options.sleep};
     status = parts.upload_filter(setup, excluded);
     if (status != Status::kOk) return fail(status);
+    if (options.continuous)
+      parts.continuous =
+          std::make_unique<ContinuousMotion>(parts.assets, options.threads, &parts.host_filter);
+    parts.options = {setup.options.gravity, setup.options.solver, setup.options.sleep,
+                     parts.continuous.get()};
     parts.simulation.emplace(parts.executor, parts.questions);
     status = parts.simulation->set_bodies({setup.properties, setup.states, parts.inner_radii, parts.boxes},
                                           parts.options);
@@ -167,22 +177,27 @@ Status GpuWorld::set_bodies(std::span<const BodyDescription> bodies, const World
   } catch (const std::bad_alloc&) {
     parts.clear();
     return fail(Status::kOutOfMemory);
+  } catch (const QueryFailed& failed) {
+    parts.clear();
+    return fail(failed.status, failed.where);
   }
   return Status::kOk;
 }
 
 Status GpuWorld::Parts::upload_filter(const WorldSetup& setup, std::span<const ObjectPair> excluded_pairs) {
-  ExcludedPairTable table;
-  Status status = table.set(excluded_pairs);
-  if (status == Status::kOk) status = excluded.upload(table.view(), executor.stream());
+  host_group = setup.group, host_mask = setup.mask, host_world = setup.world;
+  Status status = host_excluded.set(excluded_pairs);
+  if (status == Status::kOk) status = excluded.upload(host_excluded.view(), executor.stream());
   for (const auto& [from, to] :
-       {std::pair(&setup.group, &group), {&setup.mask, &mask}, {&setup.world, &world}}) {
+       {std::pair(&host_group, &group), {&host_mask, &mask}, {&host_world, &world}}) {
     if (status == Status::kOk) status = status_of(to->upload(*from, executor.stream()));
   }
   if (status == Status::kOk) status = executor.wait();
-  const bool one_world = std::ranges::all_of(setup.world, [](std::uint32_t of) { return of == kEveryWorld; });
+  const bool one_world = std::ranges::all_of(host_world, [](std::uint32_t of) { return of == kEveryWorld; });
   questions.set_filter(
       {nullptr, group.data(), mask.data(), one_world ? nullptr : world.data(), excluded.view()});
+  host_filter = {nullptr, host_group.data(), host_mask.data(), one_world ? nullptr : host_world.data(),
+                 host_excluded.view()};
   return status;
 }
 
@@ -197,15 +212,27 @@ Status GpuWorld::step_more(double dt, std::uint32_t steps) {
   if (!parts_->has_bodies()) return fail(Status::kOk);
   Parts& parts = *parts_;
   for (std::uint32_t i = 0; i < steps; ++i) {
-    const Status status = parts.simulation->step(dt);
+    std::uint64_t blamed = 0;
+    const Status status = parts.step(dt, blamed);
     parts.has_contacts = status == Status::kOk;
-    if (status != Status::kOk) {
-      const bool of_body = status == Status::kOutOfRange && parts.simulation->bad_body() != kNoIndex;
-      return fail(status, of_body ? parts.simulation->bad_body() : parts.questions.where());
-    }
+    if (status != Status::kOk) return fail(status, blamed);
     parts.time += dt;
   }
   return fail(parts.executor.wait());
+}
+
+Status GpuWorld::Parts::step(double dt, std::uint64_t& blamed) {
+  try {
+    const Status status = simulation->step(dt);
+    const bool of_body = status == Status::kOutOfRange && simulation->bad_body() != kNoIndex;
+    blamed = of_body ? simulation->bad_body() : questions.where();
+    return status;
+  } catch (const QueryFailed& failed) {
+    blamed = failed.where;
+    return failed.status;
+  } catch (const std::bad_alloc&) {
+    return Status::kOutOfMemory;
+  }
 }
 
 Status GpuWorld::bodies(std::span<const BodyMotion>& bodies) {

@@ -39,12 +39,15 @@ class BothWays {
     std::vector<AssetBox> boxes;
     for (const AssetView& view : of.assets.views())
       boxes.push_back(asset_box(view.header->lower, view.header->upper, view.header->origin));
-    EXPECT_EQ(parallel.set_bodies({setup.properties, setup.states, inner, boxes},
-                                  {setup.options.gravity, setup.options.solver, setup.options.sleep}),
+    if (options.continuous) continuous_ = std::make_unique<ContinuousMotion>(of.assets.views(), 1);
+    EXPECT_EQ(parallel.set_bodies(
+                  {setup.properties, setup.states, inner, boxes},
+                  {setup.options.gravity, setup.options.solver, setup.options.sleep, continuous_.get()}),
               Status::kOk);
     SimulationParts parts;
     parts.contacts = make_scene_contacts(of.assets.views(), 1);
     parts.ahead = std::make_unique<ContactsAhead>(of.assets.views(), 1);
+    if (options.continuous) parts.continuous = std::make_unique<ContinuousMotion>(of.assets.views(), 1);
     simulation = std::make_unique<Simulation>(std::move(setup.properties), std::move(setup.states),
                                               std::move(parts), setup.options);
   }
@@ -76,7 +79,7 @@ class BothWays {
     compare_touches(number);
     const StepCounts& counts = parallel.counts();
     middle += counts.middle, ahead += counts.approaches, missed += counts.missed;
-    touching += counts.touching;
+    touching += counts.touching, fast += counts.has_fast;
   }
 
   void place(std::uint32_t body, const BodyState& state) {
@@ -109,11 +112,12 @@ class BothWays {
   Threads threads_;
   HostExecutor executor_;
   HostQuestions questions_;
+  std::unique_ptr<ContinuousMotion> continuous_;
 
  public:
   std::unique_ptr<Simulation> simulation;
   ParallelSimulation<HostExecutor, HostQuestions> parallel;
-  std::uint32_t middle = 0, ahead = 0, missed = 0, touching = 0;
+  std::uint32_t middle = 0, ahead = 0, missed = 0, touching = 0, fast = 0;
   std::vector<WorldTouch> began;  // in the call
   std::vector<ObjectPair> ended;
 };
@@ -221,6 +225,28 @@ TEST(ParallelStep, SleepsOnWhereNothingChanges) {
   both.set_force(1, {});
   EXPECT_TRUE(both.simulation->sleeps(1));
   EXPECT_NE(both.parallel.arrays().group[1], Sleep::kAwake);
+}
+
+// Rings, cups and balls are shot at a wall of 2 cm, and at each other.
+TEST(ParallelStep, LimitsFastBodiesAsASimulationDoes) {
+  for (const bool continuous : {false, true}) {
+    FallingBodies bodies(9, 2);
+    const std::uint32_t wall = static_cast<std::uint32_t>(bodies.assets.views().size());
+    bodies.assets.add(box(0.02F, 6, 6));
+    BodyDescription& in_the_way = bodies.descriptions.emplace_back();
+    in_the_way.asset = wall, in_the_way.pose = shift(3, 0, 3), in_the_way.filter.motion = Motion::fixed;
+    for (std::uint32_t i = 1; i < 9; ++i) {
+      BodyDescription& body = bodies.descriptions[i];
+      body.velocity[0] = 100 + 20 * i;
+      body.pose.translation[2] = 0.5 + 0.25 * i;
+    }
+    BothWays both(bodies, {.continuous = continuous});
+    both.steps(60, [](int) {});
+    std::uint32_t behind = 0;
+    for (std::uint32_t i = 1; i < 9; ++i) behind += both.states()[i].position.x > 3 ? 1 : 0;
+    EXPECT_EQ(behind > 0, !continuous);
+    EXPECT_EQ(both.fast > 0, continuous);
+  }
 }
 
 // Going back gives the steps that followed, whatever happened meanwhile.

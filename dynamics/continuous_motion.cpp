@@ -35,9 +35,7 @@ ContinuousMotion::ContinuousMotion(std::span<const AssetView> shapes, std::uint3
 
 bool ContinuousMotion::find_fast(std::span<const BodyProperties> bodies, std::span<const BodyState> before,
                                  std::span<const BodyState> after) {
-  constexpr double kFast = 0.5;
-  double thinnest = INFINITY;
-  for (const BodyProperties& body : bodies) thinnest = std::min(thinnest, inner_radius(body));
+  const double thinnest = thinnest_of(bodies, inner_radius_);
   fast_.assign(bodies.size(), Motion::fixed);
   turn_.resize(bodies.size());
   way_.resize(bodies.size());
@@ -45,8 +43,7 @@ bool ContinuousMotion::find_fast(std::span<const BodyProperties> bodies, std::sp
   for (std::size_t i = 0; i < bodies.size(); ++i) {
     way_[i] = after[i].position - before[i].position;
     turn_[i] = turn_between(before[i].orientation, after[i].orientation);
-    if (bodies[i].motion == Motion::fixed) continue;
-    if (norm(way_[i]) + bodies[i].radius * norm(turn_[i]) <= kFast * thinnest) continue;
+    if (!dynamics::is_fast(bodies[i], before[i], after[i], thinnest)) continue;
     fast_[i] = Motion::moving;
     any = true;
   }

@@ -1,4 +1,6 @@
 #pragma once
+#include <algorithm>
+#include <cmath>
 #include <span>
 #include <vector>
 
@@ -7,6 +9,24 @@
 #include "tandem/kernels/impact_query.h"
 
 namespace tandem::dynamics {
+
+/// Returns whether a body moves so far in a step that it may pass through others: one of its points by more
+/// than half the inner radius of the thinnest closed shape, which is half the least side of its bounds.
+TANDEM_HD inline bool is_fast(const BodyProperties& body, const BodyState& before, const BodyState& after,
+                              double thinnest) {
+  constexpr double kFast = 0.5;
+  if (body.motion == Motion::fixed) return false;
+  const double way = norm(after.position - before.position) +
+                     body.radius * norm(turn_between(before.orientation, after.orientation));
+  return way > kFast * thinnest;
+}
+
+/// Returns the least inner radius of the bodies' shapes.
+inline double thinnest_of(std::span<const BodyProperties> bodies, std::span<const double> inner_radii) {
+  double thinnest = INFINITY;
+  for (const BodyProperties& body : bodies) thinnest = std::min(thinnest, inner_radii[body.shape]);
+  return thinnest;
+}
 
 /// Keeps fast bodies from passing through others in a step: they are carried to where they first meet
 /// another body, a slop deep, so that the next step has a contact there and stops them. Where two touch
@@ -17,8 +37,7 @@ namespace tandem::dynamics {
 /// Bodies that joints hold together stop together, at the first impact of any of them, and lose velocities
 /// together, so that their anchors come apart by no more than by what bodies turn in the step.
 ///
-/// A body is fast where one of its points moves by more than half the inner radius of the thinnest closed
-/// shape: half the least side of its bounds. Steps without a fast body cost next to nothing.
+/// See is_fast(). Steps without a fast body cost next to nothing.
 class ContinuousMotion {
  public:
   /// What the shapes and the filter look at, and the filter, must outlive this. filter: names the pairs that

@@ -50,6 +50,12 @@ struct GpuWorld::Parts {
   PairFilter filter;                   // on the GPU
   std::vector<ObjectPair> kept_apart;  // by the caller
   GpuExcludedPairs excluded;           // these, and those that joints keep from touching
+
+  // These are for continuous motion, which the CPU limits.
+  std::vector<std::uint32_t> host_group, host_mask, host_world;
+  ExcludedPairTable host_excluded;
+  PairFilter host_filter;                        // of the above
+  std::unique_ptr<ContinuousMotion> continuous;  // null: nothing limits it
   ParallelOptions options;
   bool has_contacts = false;  // those of the last step are there
   double time = 0, dt = 1;    // dt: of the last step
@@ -78,13 +84,14 @@ struct GpuWorld::Parts {
 
   bool has_bodies() const { return simulation.has_value() && !properties.empty(); }
   void clear() {
-    simulation.reset(), placed.reset();
+    simulation.reset(), placed.reset(), continuous.reset();
     properties.clear();
     broken.clear();
     has_contacts = false, time = 0, dt = 1, where = 0;
   }
   Status upload_filter(const WorldSetup& setup);
   Status exclude(std::span<const Joint> joints);
+  Status step(double dt, std::uint64_t& blamed);
   Status take_broken();
   Status read_states();
   Status read_contacts();
@@ -159,12 +166,15 @@ Status GpuWorld::set_bodies(std::span<const BodyDescription> bodies, const World
     WorldSetup setup;
     std::uint64_t blamed = 0;
     Status status = set_up(parts.assets, bodies, options, joints, setup, blamed);
-    if (status == Status::kOk && options.continuous) status = Status::kBadOption;
     if (status != Status::kOk) return fail(status, blamed);
-    parts.options = {setup.options.gravity, setup.options.solver, setup.options.sleep};
     parts.kept_apart.assign(excluded.begin(), excluded.end());
     status = parts.upload_filter(setup);
     if (status != Status::kOk) return fail(status);
+    if (options.continuous)
+      parts.continuous =
+          std::make_unique<ContinuousMotion>(parts.assets, options.threads, &parts.host_filter);
+    parts.options = {setup.options.gravity, setup.options.solver, setup.options.sleep,
+                     parts.continuous.get()};
     parts.simulation.emplace(parts.executor, parts.questions);
     status = parts.simulation->set_bodies(
         {setup.properties, setup.states, parts.inner_radii, parts.boxes, setup.joints}, parts.options);
@@ -177,19 +187,24 @@ Status GpuWorld::set_bodies(std::span<const BodyDescription> bodies, const World
   } catch (const std::bad_alloc&) {
     parts.clear();
     return fail(Status::kOutOfMemory);
+  } catch (const QueryFailed& failed) {
+    parts.clear();
+    return fail(failed.status, failed.where);
   }
   return Status::kOk;
 }
 
 Status GpuWorld::Parts::upload_filter(const WorldSetup& setup) {
+  host_group = setup.group, host_mask = setup.mask, host_world = setup.world;
   Status status = Status::kOk;
   for (const auto& [from, to] :
-       {std::pair(&setup.group, &group), {&setup.mask, &mask}, {&setup.world, &world}}) {
+       {std::pair(&host_group, &group), {&host_mask, &mask}, {&host_world, &world}}) {
     if (status == Status::kOk) status = status_of(to->upload(*from, executor.stream()));
   }
   if (status == Status::kOk) status = executor.wait();
-  const bool one_world = std::ranges::all_of(setup.world, [](std::uint32_t of) { return of == kEveryWorld; });
+  const bool one_world = std::ranges::all_of(host_world, [](std::uint32_t of) { return of == kEveryWorld; });
   filter = {nullptr, group.data(), mask.data(), one_world ? nullptr : world.data(), {}};
+  host_filter = {nullptr, host_group.data(), host_mask.data(), one_world ? nullptr : host_world.data(), {}};
   return status == Status::kOk ? exclude(setup.joints) : status;
 }
 
@@ -200,7 +215,8 @@ Status GpuWorld::Parts::exclude(std::span<const Joint> joined) {
   if (status == Status::kOk) status = excluded.upload(table.view(), executor.stream());
   if (status == Status::kOk) status = executor.wait();
   if (status != Status::kOk) return status;
-  filter.excluded = excluded.view();
+  host_excluded = std::move(table);
+  filter.excluded = excluded.view(), host_filter.excluded = host_excluded.view();
   questions.set_filter(filter);
   if (simulation.has_value()) simulation->questions_change();
   return Status::kOk;
@@ -210,13 +226,9 @@ Status GpuWorld::Parts::exclude(std::span<const Joint> joined) {
 Status GpuWorld::Parts::take_broken() {
   const auto of_step = simulation->broken();
   if (of_step.empty()) return Status::kOk;
-  try {
-    broken.insert(broken.end(), of_step.begin(), of_step.end());
-    std::ranges::sort(broken);
-    return exclude(simulation->joints());
-  } catch (const std::bad_alloc&) {
-    return Status::kOutOfMemory;
-  }
+  broken.insert(broken.end(), of_step.begin(), of_step.end());
+  std::ranges::sort(broken);
+  return exclude(simulation->joints());
 }
 
 Status GpuWorld::step(double dt, std::uint32_t steps) {
@@ -232,16 +244,27 @@ Status GpuWorld::step_more(double dt, std::uint32_t steps) {
   Parts& parts = *parts_;
   if (steps > 0) parts.dt = dt;
   for (std::uint32_t i = 0; i < steps; ++i) {
-    Status status = parts.simulation->step(dt);
+    std::uint64_t blamed = 0;
+    const Status status = parts.step(dt, blamed);
     parts.has_contacts = status == Status::kOk;
-    if (status == Status::kOk) status = parts.take_broken();
-    if (status != Status::kOk) {
-      const bool of_body = status == Status::kOutOfRange && parts.simulation->bad_body() != kNoIndex;
-      return fail(status, of_body ? parts.simulation->bad_body() : parts.questions.where());
-    }
+    if (status != Status::kOk) return fail(status, blamed);
     parts.time += dt;
   }
   return fail(parts.executor.wait());
+}
+
+Status GpuWorld::Parts::step(double dt, std::uint64_t& blamed) {
+  try {
+    const Status status = simulation->step(dt);
+    const bool of_body = status == Status::kOutOfRange && simulation->bad_body() != kNoIndex;
+    blamed = of_body ? simulation->bad_body() : questions.where();
+    return status == Status::kOk ? take_broken() : status;
+  } catch (const QueryFailed& failed) {
+    blamed = failed.where;
+    return failed.status;
+  } catch (const std::bad_alloc&) {
+    return Status::kOutOfMemory;
+  }
 }
 
 Status GpuWorld::bodies(std::span<const BodyMotion>& bodies) {

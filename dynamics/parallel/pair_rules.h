@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <span>
 
+#include "dynamics/continuous_motion.h"
 #include "dynamics/pair_touch.h"
 #include "dynamics/parallel/atomics.h"
 #include "dynamics/parallel/pair_lists.h"

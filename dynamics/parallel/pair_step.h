@@ -38,6 +38,8 @@ struct PairStep {
     to.for_each(nullptr, a.bodies, [of] TANDEM_HD(std::uint32_t i) {
       of.ways_ahead[i] = way_of(of.acting[i], of.start[i], of.end[i]);
       if (!is_usable(of.end[i])) atomic_least(of.counts->bad_body, i);
+      if (of.thinnest < INFINITY && is_fast(of.acting[i], of.start[i], of.end[i], of.thinnest))
+        atomic_or(of.counts->has_fast, 1);
     });
     select([of] TANDEM_HD(std::uint32_t i) { return is_surprised(of, i); }, &of.counts->surprised);
   }

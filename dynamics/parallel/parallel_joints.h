@@ -93,6 +93,12 @@ class ParallelJoints {
   }
 
   std::span<const Joint> all() const { return joints_; }
+  /// Returns the bodies of each joint, see Joint::pair().
+  std::vector<ObjectPair> joined() const {
+    std::vector<ObjectPair> out;
+    for (const Joint& joint : joints_) out.push_back(joint.pair());
+    return out;
+  }
   std::span<const std::uint32_t> broken() const { return broken_; }
 
   /// Copies what each joint keeps from the executor's memory.

@@ -49,6 +49,7 @@ struct ParallelOptions {
   Vector3 gravity = {0, 0, -9.81};
   SolverOptions solver;  ///< soft contacts for all islands, whatever `kind` says
   SleepOptions sleep;
+  ContinuousMotion* continuous = nullptr;  ///< limits fast bodies, on the CPU; null: nobody does
 };
 
 /// All that the next steps of a parallel simulation depend on, beside what bodies are and options; its bytes
@@ -82,6 +83,7 @@ class ParallelSimulation {
   Status set_bodies(const ParallelBodies& bodies, const ParallelOptions& options) {
     bodies_ = static_cast<std::uint32_t>(bodies.properties.size());
     options_ = options;
+    thinnest_ = options.continuous != nullptr ? thinnest_of(bodies.properties, bodies.inner_radii) : INFINITY;
     within_ = 0, has_forces_ = false, ++generation_;
     most_pairs_ = most_moved_ = most_found_ = most_remembered_ = 0;
     records_count_ = remembered_count_ = 0;
@@ -95,7 +97,8 @@ class ParallelSimulation {
   }
 
   /// Makes a step. Result: kOutOfRange where a body has left the range of numbers, and bad_body() is the
-  /// body; or what a question says. After an error bodies and contacts are as before the step.
+  /// body; or what a question says. Throws what ContinuousMotion does. After an error bodies and contacts are
+  /// as before the step.
   Status step(double dt) {
     constexpr int kMostRepeats = 12;
     if (dt != dt_) dt_ = dt, ++generation_;
@@ -105,6 +108,9 @@ class ParallelSimulation {
       const Status status = try_step(a, whole);
       if (status != Status::kOk) return status;
       if (!whole) continue;
+      if (read_.has_fast != 0) {
+        if (const Status limited = limit(a); limited != Status::kOk) return limited;
+      }
       queue(kFinish, [&] {
         PairStep<Executor, Questions>{to_, ask_, a}.finish();
         sleep_step(to_, a, options_.sleep);
@@ -258,7 +264,7 @@ class ParallelSimulation {
     a.impulses_before = impulses_before_.data(), a.impulses = impulses_.data(), a.done = done_.data();
     a.counts = counts_.data();
     a.joints = joints_.arrays(&a.counts->broken);
-    a.dt = dt, a.gravity = options_.gravity, a.options = options_.solver;
+    a.dt = dt, a.thinnest = thinnest_, a.gravity = options_.gravity, a.options = options_.solver;
     return a;
   }
 
@@ -302,6 +308,21 @@ class ParallelSimulation {
         queue_reading();
       });
     }
+  }
+
+  // The CPU limits fast bodies, in steps that have any.
+  Status limit(const StepArrays& a) {
+    std::vector<BodyProperties> acting(bodies_);
+    std::vector<BodyState> start(bodies_), end(bodies_);
+    Status status = to_.copy(a.acting, std::span(acting));
+    if (status == Status::kOk) status = to_.copy(a.start, std::span(start));
+    if (status == Status::kOk) status = to_.copy(a.end, std::span(end));
+    if (status != Status::kOk) return status;
+    options_.continuous->limit(acting, joints_.joined(), start, end, options_.solver.slop);
+    status = to_.copy(std::span<const BodyState>(end), a.end);
+    if (status != Status::kOk || a.joints.count == 0) return status;
+    solver_.end_joints(to_);  // of bodies as they stand now
+    return to_.copy(a.counts, std::span(&read_, 1));
   }
 
   void solve(const StepArrays& a) {
@@ -495,6 +516,7 @@ class ParallelSimulation {
   std::uint32_t bodies_ = 0, most_pairs_ = 0, most_moved_ = 0, most_found_ = 0, most_remembered_ = 0;
   std::uint32_t records_count_ = 0, remembered_count_ = 0;  // of the last step that was whole
   double within_ = 0;                                       // how far apart near pairs are
+  double thinnest_ = INFINITY;
   bool has_forces_ = false;
   StepCounts read_ = {};
   SoftStepNeeds solver_needs_ = {};

@@ -80,7 +80,6 @@ namespace soft_step_detail {
 
 TANDEM_HD inline void fill_body(const SoftStepView& view, std::uint32_t i) {
   if (i == 0) *view.bounces = 0, *view.sweeps.arrived = 0;
-  if (i == 0 && view.input.joints.count > 0) *view.input.joints.broken = 0;
   view.sweeps.velocities[i] = {}, view.sweeps.moved[i] = {};
   if (!view.is_held(i)) return;
   view.bodies[i] = soft_body(view.numbers, view.unit_root(), i);
@@ -238,6 +237,15 @@ class ParallelSoftStep {
     executor.for_each(nullptr, view.input.body_count, [=] TANDEM_HD(std::uint32_t i) { end_body(view, i); });
     executor.for_each(view.groups.lanes, kSoftWidth * room_.groups,
                       [=] TANDEM_HD(std::uint32_t i) { end_lane(view, i); });
+    end_joints(executor);
+  }
+
+  /// Takes what the joints of the last step did, and where they are. Condition: the bodies stand as at its
+  /// end.
+  void end_joints(Executor& executor) {
+    const SoftStepView view = *view_;
+    if (view.input.joints.count == 0) return;
+    executor.once([=] TANDEM_HD() { *view.input.joints.broken = 0; });
     executor.for_each(nullptr, view.input.joints.count, [=] TANDEM_HD(std::uint32_t i) {
       if (view.groups.needs->has_room != 0)
         end_joint(view.input.joints, view.output.states, view.input.dt, i);

@@ -49,6 +49,7 @@ struct StepCounts {
   std::uint32_t found, remembered, touching;  ///< contacts found, room for those remembered, pairs that push
   std::uint32_t broken;                       ///< joints that break at the end of the step
   std::uint32_t bad_start, bad_body;          ///< the first whose state is not usable, or kNoIndex
+  std::uint32_t has_fast;                     ///< 1: a body is_fast()
   std::uint32_t listed;                       ///< pairs, between steps
   LargestReach reach;
 };
@@ -117,6 +118,7 @@ struct StepArrays {
 
   StepCounts* counts;
   double dt;
+  double thinnest;  ///< see is_fast(); infinite: nobody asks
   Vector3 gravity;
   SolverOptions options;
 

@@ -156,7 +156,7 @@ static void test_a_world(tandem_asset* cube) {
   CHECK_STATUS(tandem_gpu_world_create(NULL, &none, &world), TANDEM_OUT_OF_MEMORY);
   check_options((Options){.no_friction = 1, .substeps = 10000, .threads = 1024}, TANDEM_OK);
   check_options((Options){.struct_size = 8}, TANDEM_BAD_STRUCT_SIZE);
-  check_options((Options){.continuous = 1}, TANDEM_BAD_OPTION);
+  check_options((Options){.continuous = 1}, TANDEM_OK);
   check_options((Options){.substeps = 10001}, TANDEM_BAD_OPTION);
   check_options((Options){.threads = 1025}, TANDEM_BAD_OPTION);
   check_options((Options){.friction = -1}, TANDEM_BAD_OPTION);

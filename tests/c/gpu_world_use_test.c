@@ -203,6 +203,27 @@ static void test_wrong_calls(void) {
   tandem_gpu_world_destroy(world);
 }
 
+// A box that is shot at another one stays on its side where motion is continuous.
+static void test_continuous_motion(void) {
+  static const uint8_t motion[] = {TANDEM_FIXED, TANDEM_MOVING};
+  static const double speeds[] = {0, 0, 0, 0, 0, -900};
+  const tandem_instance bodies[] = {at(0, 0, 0), at(0, 0, 5)};
+  const tandem_pair_filter filter = {.struct_size = sizeof filter, .count = 2, .motion = motion};
+  const tandem_body_start start = {.struct_size = sizeof start, .count = 2, .velocity = speeds};
+  for (uint32_t continuous = 0; continuous < 2; ++continuous) {
+    const tandem_world_options options = {.struct_size = sizeof options, .continuous = continuous};
+    const tandem_body_motion* moved = NULL;
+    tandem_gpu_world* world = NULL;
+    CHECK_STATUS(tandem_gpu_world_create(&options, NULL, &world), TANDEM_OK);
+    CHECK_STATUS(tandem_gpu_world_set_assets(world, &box, 1, NULL), TANDEM_OK);
+    CHECK_STATUS(tandem_gpu_world_set_bodies(world, bodies, 2, &filter, &start), TANDEM_OK);
+    CHECK_STATUS(tandem_gpu_world_step(world, 1.0 / 60, 60), TANDEM_OK);
+    CHECK_STATUS(tandem_gpu_world_bodies(world, &moved, NULL), TANDEM_OK);
+    CHECK((moved[1].centre[2] > 0.9) == (continuous == 1));
+    tandem_gpu_world_destroy(world);
+  }
+}
+
 static void test_going_back(void) {
   tandem_gpu_world* world = world_of_boxes(NULL);
   tandem_gpu_world_state* state = NULL;
@@ -330,6 +351,7 @@ int main(int argc, char** argv) {
   test_rest();
   test_the_same_bytes_twice();
   test_states_in_place();
+  test_continuous_motion();
   test_going_back();
   test_a_filter();
   test_joints();

@@ -46,12 +46,17 @@ class BothWays {
     std::vector<AssetBox> boxes;
     for (const AssetView& view : of.assets.views())
       boxes.push_back(asset_box(view.header->lower, view.header->upper, view.header->origin));
-    EXPECT_EQ(parallel.set_bodies({setup.properties, setup.states, inner, boxes, setup.joints},
-                                  {setup.options.gravity, setup.options.solver, setup.options.sleep}),
+    if (options.continuous)
+      continuous_ = std::make_unique<dynamics::ContinuousMotion>(of.assets.views(), 1, &filter_);
+    EXPECT_EQ(parallel.set_bodies(
+                  {setup.properties, setup.states, inner, boxes, setup.joints},
+                  {setup.options.gravity, setup.options.solver, setup.options.sleep, continuous_.get()}),
               Status::kOk);
     dynamics::SimulationParts parts;
     parts.contacts = dynamics::make_scene_contacts(of.assets.views(), 1, &filter_);
     parts.ahead = std::make_unique<dynamics::ContactsAhead>(of.assets.views(), 1, &filter_);
+    if (options.continuous)
+      parts.continuous = std::make_unique<dynamics::ContinuousMotion>(of.assets.views(), 1, &filter_);
     parts.joints = std::move(setup.joints);
     simulation = std::make_unique<dynamics::Simulation>(std::move(setup.properties), std::move(setup.states),
                                                         std::move(parts), setup.options);
@@ -87,7 +92,7 @@ class BothWays {
     if (!simulation->broken().empty()) keep_apart(simulation->joints());
     const dynamics::StepCounts& counts = parallel.counts();
     middle += counts.middle, ahead += counts.approaches, missed += counts.missed;
-    touching += counts.touching;
+    touching += counts.touching, fast += counts.has_fast;
   }
 
   std::uint32_t add_joint(const JointDescription& description) {
@@ -181,11 +186,12 @@ class BothWays {
   dynamics::Threads threads_;
   dynamics::HostExecutor executor_;
   dynamics::HostQuestions questions_;
+  std::unique_ptr<dynamics::ContinuousMotion> continuous_;
 
  public:
   std::unique_ptr<dynamics::Simulation> simulation;
   dynamics::ParallelSimulation<dynamics::HostExecutor, dynamics::HostQuestions> parallel;
-  std::uint32_t middle = 0, ahead = 0, missed = 0, touching = 0;
+  std::uint32_t middle = 0, ahead = 0, missed = 0, touching = 0, fast = 0;
   std::vector<WorldTouch> began;  // in the call
   std::vector<ObjectPair> ended;
 };

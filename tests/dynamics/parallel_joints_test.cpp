@@ -205,6 +205,24 @@ TEST(ParallelJoints, AreNotSolvedWhereRoomIsShort) {
   EXPECT_GT(both.touching, 3 * 150u);
 }
 
+// Joined bodies that fall fast stop together, and joints are where they are then.
+TEST(ParallelJoints, StopTogetherWhereMotionIsContinuous) {
+  JoinedBoxes boxes;
+  for (int i = 0; i < 4; ++i) {
+    const std::uint32_t a = boxes.add(2.0 * i, 0, 1), b = boxes.add(2.0 * i + 0.5, 0, 1);
+    JointDescription& joint =
+        boxes.join(i % 2 == 0 ? JointKind::hinge : JointKind::ball, a, b, {2.0 * i + 0.25, 0, 1});
+    joint.axis[1] = 1, joint.breaking_force = i == 3 ? 1000 : INFINITY;
+    boxes.descriptions[a].velocity[2] = boxes.descriptions[b].velocity[2] = -60 - 10 * i;
+    boxes.descriptions[b].angular_velocity[1] = 5;
+  }
+  BothWays both = begin(boxes, {.continuous = true});
+  steps(both, 60);
+  EXPECT_GT(both.fast, 0u);
+  EXPECT_FALSE(both.simulation->joints()[3].holds);
+  for (std::uint32_t i = 1; i < both.parallel.bodies(); ++i) EXPECT_GT(both.states()[i].position.z, 0);
+}
+
 // Going back brings joints back that broke, were added, removed or driven otherwise meanwhile.
 TEST(ParallelJoints, GoBackToAState) {
   const JoinedBoxes heap = heap_of_pairs();

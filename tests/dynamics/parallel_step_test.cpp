@@ -115,6 +115,28 @@ TEST(ParallelStep, SleepsOnWhereNothingChanges) {
   EXPECT_NE(both.parallel.arrays().group[1], Sleep::kAwake);
 }
 
+// Rings, cups and balls are shot at a wall of 2 cm, and at each other.
+TEST(ParallelStep, LimitsFastBodiesAsASimulationDoes) {
+  for (const bool continuous : {false, true}) {
+    FallingBodies bodies(9, 2);
+    const std::uint32_t wall = static_cast<std::uint32_t>(bodies.assets.views().size());
+    bodies.assets.add(box(0.02F, 6, 6));
+    BodyDescription& in_the_way = bodies.descriptions.emplace_back();
+    in_the_way.asset = wall, in_the_way.pose = shift(3, 0, 3), in_the_way.filter.motion = Motion::fixed;
+    for (std::uint32_t i = 1; i < 9; ++i) {
+      BodyDescription& body = bodies.descriptions[i];
+      body.velocity[0] = 100 + 20 * i;
+      body.pose.translation[2] = 0.5 + 0.25 * i;
+    }
+    BothWays both(bodies, {.continuous = continuous});
+    both.steps(60, [](int) {});
+    std::uint32_t behind = 0;
+    for (std::uint32_t i = 1; i < 9; ++i) behind += both.states()[i].position.x > 3 ? 1 : 0;
+    EXPECT_EQ(behind > 0, !continuous);
+    EXPECT_EQ(both.fast > 0, continuous);
+  }
+}
+
 // Going back gives the steps that followed, whatever happened meanwhile.
 TEST(ParallelStep, GoesBackToAState) {
   const FallingBodies bodies(40, 7);

@@ -55,9 +55,14 @@ def test_without_a_gpu_the_reason_is_told():
     assert told.stdout.startswith("NoGpu there is no GPU"), told.stderr
 
 
-def test_continuous_motion_is_missing():
-    with pytest.raises(NotImplementedError, match="no continuous motion"):
-        tandem.World([BOX], continuous=True, device="cuda")
+@needs_gpu
+def test_continuous_motion_is_that_of_the_cpu():
+    fixed = tandem.Filter(motion=[tandem.FIXED, tandem.MOVING])
+    on_cpu, on_gpu = (tandem.World([BOX], translation=[[0, 0, 0], [0, 0, 5]], velocity=[[0, 0, 0], [0, 0, -900]], filter=fixed, continuous=True,
+                                   device=device) for device in ("cpu", "cuda"))
+    for world in (on_cpu, on_gpu):
+        world.step(1 / 60, 60)
+    assert on_gpu.translation[1, 2] > 0.9 and np.allclose(on_gpu.translation, on_cpu.translation, atol=0.01)
 
 
 @needs_gpu

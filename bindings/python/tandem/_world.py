@@ -151,8 +151,6 @@ def _core(gpu: int | None, assets: list[_tandem.Asset], gravity: _Numbers, frict
     options = (assets, gravity, friction, restitution, slop, lever, substeps, sleeping, continuous, threads)
     if gpu is None:
         return _tandem.World(*options)
-    if continuous:
-        raise NotImplementedError("a world on a GPU has no continuous motion yet: that is of device='cpu'")
     from . import cuda  # says why it is not there
 
     return cuda.WorldCore(*options, gpu)
@@ -174,10 +172,10 @@ class World:
         substeps: parts of a step that share its contacts, 1 to 10,000.
         sleeping: bodies that rest with all that they touch are left alone.
         continuous: fast bodies are carried to where they first meet others.
-        threads: that a call may use, 1 to 1,024, the caller's thread included. Results do not depend on it. Not looked at on a GPU.
+        threads: that a call may use, 1 to 1,024, the caller's thread included. Results do not depend on it. A GPU uses them for continuous motion alone.
         device: "cpu", or "cuda" or "cuda:1", the GPU on which the bodies move.
 
-    On a GPU bodies move by the same rules, but all contacts and joints are soft, and there is no continuous motion, which raises NotImplementedError. Results
+    On a GPU bodies move by the same rules, but all contacts and joints are soft. Results
     are arrays in CPU memory, as on the CPU, and `states` lies in GPU memory. The same calls give the same bytes on GPUs of one kind, but not those of the CPU.
 
     Calls let other Python threads run. A world takes one call at a time: a second thread gets RuntimeError; several worlds may share assets.

@@ -45,8 +45,7 @@ tandem_status tandem_gpu_world_create(const tandem_world_options* options, const
   return create(allocator, world, [&](tandem_gpu_world& made) -> tandem_status {
     if (const tandem_status status = read_options(options, made.options); status != TANDEM_OK) return status;
     // A world on the CPU checks them without a GPU.
-    return made.options.continuous ? tandem_status{TANDEM_BAD_OPTION}
-                                   : to_c(World().set_bodies({}, made.options));
+    return to_c(World().set_bodies({}, made.options));
   });
 }
 

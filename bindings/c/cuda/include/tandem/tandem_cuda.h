@@ -684,7 +684,7 @@ TANDEM_API size_t tandem_gpu_probe_query_bytes(const tandem_gpu_probe_query* que
 /// ---- Worlds on a GPU
 
 /// Rigid bodies that move on a GPU, by the rules of a tandem_world and from the same structs. Bodies,
-/// contacts and pairs stay in GPU memory. It has no continuous motion, and all contacts and joints are soft;
+/// contacts and pairs stay in GPU memory. All contacts and joints are soft;
 /// docs/dynamics.md says what that means. The same calls give the same bytes on GPUs of one kind, but not
 /// those of a tandem_world. A world takes one call at a time, and belongs to the device that was current when
 /// it was given its assets.
@@ -698,8 +698,8 @@ typedef struct tandem_gpu_body_state {
   double angular_velocity[3];  ///< in the world
 } tandem_gpu_body_state;
 
-/// Makes a world, which has the options for good; `threads` is only checked. It needs no GPU yet. Result: as
-/// of tandem_world_create(), and TANDEM_BAD_OPTION where `continuous` is set.
+/// Makes a world, which has the options for good; `threads` are those of the CPU, which limits continuous
+/// motion. It needs no GPU yet. Result: as of tandem_world_create().
 TANDEM_API tandem_status tandem_gpu_world_create(const tandem_world_options* options,
                                                  const tandem_allocator* allocator, tandem_gpu_world** world);
 /// Waits for the GPU. Null does nothing.

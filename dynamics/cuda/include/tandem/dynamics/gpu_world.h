@@ -18,10 +18,10 @@ struct GpuBodyState {
 };
 
 /// Rigid bodies of meshes that move on a GPU: those of World, by the same rules, but that all contacts and
-/// joints are soft and there is no continuous motion. Contacts are found, solved and remembered in GPU
-/// memory; the CPU reads a few numbers once a step. Throws nothing. Movable, not copyable. One call at a
-/// time, and all with the GPU that was the current one at set_assets(). The same calls give the same bytes on
-/// GPUs of one kind; docs/dynamics.md says how they differ from World's.
+/// joints are soft. Contacts are found, solved and remembered in GPU memory; the CPU reads a few numbers once
+/// a step, and limits continuous motion in steps that have fast bodies. Throws nothing. Movable, not
+/// copyable. One call at a time, and all with the GPU that was the current one at set_assets(). The same
+/// calls give the same bytes on GPUs of one kind; docs/dynamics.md says how they differ from World's.
 ///
 /// All functions may also return kNoGpu, kDriverTooOld, kGpuNotSupported, kOutOfGpuMemory or kCudaFailed.
 class GpuWorld {
@@ -36,8 +36,8 @@ class GpuWorld {
   /// Scene::set_assets(), and kNoOrientedBlocks or kNoTopology, where where() is the asset.
   Status set_assets(std::span<const AssetView> assets, cudaStream_t stream = nullptr);
 
-  /// Places all bodies anew, at time 0. Result: as of World::set_bodies(), and kBadOption where `continuous`
-  /// is set. WorldOptions::threads is not looked at.
+  /// Places all bodies anew, at time 0. Result: as of World::set_bodies(). WorldOptions::threads: of the CPU,
+  /// which limits continuous motion.
   Status set_bodies(std::span<const BodyDescription> bodies, const WorldOptions& options = {},
                     std::span<const ObjectPair> excluded = {}, std::span<const JointDescription> joints = {});
 

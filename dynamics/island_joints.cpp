@@ -20,7 +20,7 @@ BodyState unmoved(const IslandProblem& problem, const StepInput& input, std::uin
 Vector6 gradient(const IslandProblem& problem, std::uint32_t place, const Vector3& linear,
                  const Vector3& angular) {
   if (place == 0) return {};
-  const MassScale& scale = problem.scale[place];
+  const MassScale& scale = problem.stepped[place].scale;
   return {linear / scale.root_mass, transposed(scale.spread) * angular};
 }
 
@@ -62,13 +62,13 @@ void add_joint_rows(IslandProblem& problem, const StepInput& input, std::uint32_
 }
 
 void follow_joints(const IslandProblem& problem, const StepInput& input,
-                   const std::vector<Vector6>& displacement, double time, std::span<JointRow> rows) {
+                   std::span<const Vector6> displacement, double time, std::span<JointRow> rows) {
   const auto moved = [&](std::uint32_t body, std::uint32_t place) {
     BodyState state = unmoved(problem, input, body);
     Vector3 way = time * state.velocity, turn = time * state.angular_velocity;
     if (place > 0) {
-      way = displacement[place].linear / problem.scale[place].root_mass;
-      turn = problem.scale[place].spread * displacement[place].angular;
+      way = displacement[place].linear / problem.stepped[place].scale.root_mass;
+      turn = problem.stepped[place].scale.spread * displacement[place].angular;
     }
     state.position += way;
     state.orientation = rotation_by(turn) * state.orientation;
@@ -91,7 +91,7 @@ JointSpan::JointSpan(const IslandProblem& problem, const StepInput& input)
   for (const std::uint32_t joint : problem.joints) first_.push_back(geometry_at_start(problem, input, joint));
 }
 
-void JointSpan::end_with(const std::vector<Vector6>& velocity, const std::vector<Vector6>& displacement) {
+void JointSpan::end_with(std::span<const Vector6> velocity, std::span<const Vector6> displacement) {
   const auto state = [&](std::uint32_t body, std::uint32_t place) {
     if (place > 0) return state_at_end(problem_, input_, place, velocity[place], displacement[place]);
     BodyState at_end = unmoved(problem_, input_, body);

@@ -13,7 +13,7 @@ void add_joint_rows(IslandProblem& problem, const StepInput& input, std::uint32_
 /// Makes the rows those of the bodies as they are some time after the start of the step, when they have moved
 /// by the displacement: gradients, drives and ways.
 void follow_joints(const IslandProblem& problem, const StepInput& input,
-                   const std::vector<Vector6>& displacement, double time, std::span<JointRow> rows);
+                   std::span<const Vector6> displacement, double time, std::span<JointRow> rows);
 
 /// The joints of an island over a step, from states at its start to states at its end, of which a solver has
 /// guesses that become better.
@@ -24,7 +24,7 @@ class JointSpan {
   bool empty() const { return problem_.joints.empty(); }
 
   /// Takes the velocities and displacements that the bodies are guessed to end with.
-  void end_with(const std::vector<Vector6>& velocity, const std::vector<Vector6>& displacement);
+  void end_with(std::span<const Vector6> velocity, std::span<const Vector6> displacement);
 
   /// Make the rows those of the mean of both ends, or of the end. Their ways stay those from the start.
   void set_middle_rows(std::span<JointRow> rows) const;

@@ -47,14 +47,14 @@ inline std::vector<JointBlock> joint_blocks(std::span<const JointRow> rows) {
 }
 
 /// Adds an impulse of a row to the velocities of its bodies.
-inline void push(JointRow& row, std::vector<Vector6>& velocity, double impulse) {
+inline void push(JointRow& row, std::span<Vector6> velocity, double impulse) {
   velocity[row.a] += impulse * row.gradient.a;
   velocity[row.b] += impulse * row.gradient.b;
   row.impulse += impulse;
 }
 
 /// Visits a row that is a motor or a limit, see visit_joint().
-inline void visit_free_row(JointRow& row, std::vector<Vector6>& velocity, double h, const Softness* soft) {
+inline void visit_free_row(JointRow& row, std::span<Vector6> velocity, double h, const Softness* soft) {
   const double mobility = row.gradient.mobility(), w = row.along(velocity) + row.drive;
   const auto wanted = [&](double speed) { return row.impulse + (speed - w) / mobility; };
   // A bound that is not reached yet may be reached in the substep, but not passed.
@@ -78,7 +78,7 @@ inline void visit_free_row(JointRow& row, std::vector<Vector6>& velocity, double
 /// Changes the impulses of a joint's rows, and the velocities of its bodies, by one visit of a sweep. The
 /// rows' impulses and bounds are those of a substep of length h, their ways those that are left now. soft:
 /// how what is out of place comes back; null: it does not, and only velocities are mended.
-inline void visit_joint(const JointBlock& block, std::span<JointRow> rows, std::vector<Vector6>& velocity,
+inline void visit_joint(const JointBlock& block, std::span<JointRow> rows, std::span<Vector6> velocity,
                         double h, const Softness* soft) {
   for (std::uint32_t i = block.held_end; i < block.end; ++i) visit_free_row(rows[i], velocity, h, soft);
   const std::uint32_t held = block.held_end - block.begin;

@@ -34,12 +34,14 @@ void SoftJoints::start(const StepInput& input, std::span<const std::uint32_t> is
   }
   std::ranges::sort(place_);
   place_.erase(std::unique(place_.begin(), place_.end()), place_.end());
+  stepped_.clear();
   for (const std::uint32_t i : place_) {
-    problem_.scale.push_back(bodies[i].scale);
+    stepped_.push_back(bodies[i]);
     at_start_.push_back(bodies[i].velocity);
   }
-  problem_.velocity = at_start_;
-  problem_.displacement.assign(place_.size(), Vector6{}), due_.assign(place_.size(), Vector6{});
+  velocity_ = at_start_;
+  displacement_.assign(place_.size(), Vector6{}), due_.assign(place_.size(), Vector6{});
+  problem_.stepped = stepped_, problem_.velocity = velocity_, problem_.displacement = displacement_;
   const auto own_place = [&](std::uint32_t body) {
     if (!is_moved(body)) return 0u;
     return static_cast<std::uint32_t>(std::ranges::lower_bound(place_, place[body]) - place_.begin());
@@ -62,7 +64,7 @@ void SoftJoints::push(std::span<SoftMotion> velocities) {
 
 void SoftJoints::follow(std::span<const SoftMotion> moved, double time) {
   for (std::size_t i = 1; i < place_.size(); ++i)
-    problem_.displacement[i] = time * at_start_[i] + of_masses(problem_.scale[i], moved[place_[i]]);
+    problem_.displacement[i] = time * at_start_[i] + of_masses(problem_.stepped[i].scale, moved[place_[i]]);
   due_.assign(place_.size(), Vector6{});
   add_impulses(-1, due_);
   follow_joints(problem_, *input_, problem_.displacement, time, problem_.joint_rows);
@@ -96,18 +98,18 @@ void SoftJoints::write(std::span<JointMemory> memory) const {
 
 void SoftJoints::read(std::span<const SoftMotion> velocities) {
   for (std::size_t i = 1; i < place_.size(); ++i)
-    problem_.velocity[i] = at_start_[i] + of_masses(problem_.scale[i], velocities[place_[i]]);
+    problem_.velocity[i] = at_start_[i] + of_masses(problem_.stepped[i].scale, velocities[place_[i]]);
 }
 
 void SoftJoints::write(std::span<SoftMotion> velocities) const {
   for (std::size_t i = 1; i < place_.size(); ++i) {
     const Vector6 added = problem_.velocity[i] - at_start_[i];
-    put(added.linear / problem_.scale[i].root_mass, velocities[place_[i]].centre);
+    put(added.linear / problem_.stepped[i].scale.root_mass, velocities[place_[i]].centre);
     put(added.angular, velocities[place_[i]].spin);
   }
 }
 
-void SoftJoints::add_impulses(double sign, std::vector<Vector6>& to) const {
+void SoftJoints::add_impulses(double sign, std::span<Vector6> to) const {
   for (const JointRow& row : problem_.joint_rows) {
     to[row.a] += sign * row.impulse * row.gradient.a;
     to[row.b] += sign * row.impulse * row.gradient.b;

@@ -39,10 +39,12 @@ class SoftJoints {
  private:
   void read(std::span<const SoftMotion> velocities);
   void write(std::span<SoftMotion> velocities) const;
-  void add_impulses(double sign, std::vector<Vector6>& to) const;
+  void add_impulses(double sign, std::span<Vector6> to) const;
 
   const StepInput* input_ = nullptr;
-  IslandProblem problem_;                // of bodies that have joints, and without contacts
+  IslandProblem problem_;             // of bodies that have joints, and without contacts
+  std::vector<SteppedBody> stepped_;  // its arrays
+  std::vector<Vector6> velocity_, displacement_;
   std::vector<std::uint32_t> place_;     // of each of its bodies
   std::vector<Vector6> at_start_, due_;  // velocities, and what is to be added to them
   std::vector<JointBlock> blocks_;

@@ -98,8 +98,8 @@ class ConvexJoints {
     double most = 0;
     for (const JointRow& row : problem_.joint_rows) {
       for (const auto& y : {start, end})
-        most = std::max({most, std::fabs(dot(row.gradient.a, y[row.a])),
-                         std::fabs(dot(row.gradient.b, y[row.b]))});
+        most = std::max(
+            {most, std::fabs(dot(row.gradient.a, y[row.a])), std::fabs(dot(row.gradient.b, y[row.b]))});
     }
     return most;
   }

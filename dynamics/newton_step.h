@@ -13,7 +13,7 @@ struct NewtonScratch {
   ConvexScratch convex;
   ConvexGoal goal;
   IslandImpulses impulse, way_impulse;
-  std::span<double> target;    // of velocities along normals
+  std::span<double> target;      // of velocities along normals
   std::span<Vector6> end, mean;  // velocities at the end; those of the displacement
 
   TANDEM_HD void carve(Carver& carver, const ContactIsland& island, std::size_t block_count) {
@@ -49,7 +49,8 @@ class NewtonStep {
         correction_(correction),
         joints_(joints),
         contacts_(team, island, scratch.convex, joints) {
-    team.each(island.contact_count(), [&](std::uint32_t i) { scratch.impulse.contact[i] = island.impulse[i]; });
+    team.each(island.contact_count(),
+              [&](std::uint32_t i) { scratch.impulse.contact[i] = island.impulse[i]; });
     team.each(island.pair_count(),
               [&](std::uint32_t i) { scratch.impulse.turning[i] = island.pairs[i].impulse; });
     team.each(island.body_count(), [&](std::uint32_t j) { scratch.end[j] = island.velocity[j]; });
@@ -108,9 +109,8 @@ class NewtonStep {
       with_.goal.target[i] = -(s < 0 ? correction_ : 1) * s / step_.dt;
       with_.goal.impulse.contact[i] = {}, with_.goal.bound[i] = 0;
     });
-    team_.each(island_.pair_count(), [&](std::uint32_t i) {
-      with_.goal.impulse.turning[i] = {}, with_.goal.turning_bound[i] = 0;
-    });
+    team_.each(island_.pair_count(),
+               [&](std::uint32_t i) { with_.goal.impulse.turning[i] = {}, with_.goal.turning_bound[i] = 0; });
     team_.each(island_.body_count(), [&](std::uint32_t j) { with_.mean[j] = with_.goal.free[j]; });
     if constexpr (Joints::kAny) joints_.aim_at_ways(step_.dt);
     team_.barrier();
@@ -146,9 +146,8 @@ class NewtonStep {
       return norm(island_.relative(i, island_.velocity) + island_.drive[i]);
     });
     if constexpr (Joints::kAny) approach = std::max(approach, joints_.fastest(island_.velocity, with_.end));
-    const double pull = team_.most(0, island_.body_count() - 1, [&](std::uint32_t k) {
-      return step_.pull_of(island_.bodies[k + 1]);
-    });
+    const double pull = team_.most(0, island_.body_count() - 1,
+                                   [&](std::uint32_t k) { return step_.pull_of(island_.bodies[k + 1]); });
     return kOfGravity * step_.dt * pull + kOfApproach * approach;
   }
 

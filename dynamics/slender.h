@@ -33,8 +33,8 @@ TANDEM_HD inline double turn_about(const ContactPoint& contact, std::span<const 
 }
 
 /// Returns into how many parts a step of Newton's method is divided. Bodies that spin fast about the normal
-/// of a contact, as tops do, have several, in which their contacts turn with them. turn: see turn_about(), the
-/// largest of all contacts.
+/// of a contact, as tops do, have several, in which their contacts turn with them. turn: see turn_about(),
+/// the largest of all contacts.
 TANDEM_HD inline std::uint32_t parts_for(double turn) {
   constexpr double kTurn = 0.1, kMostParts = 16;  // radians in a part
   return static_cast<std::uint32_t>(std::min(std::floor(turn / kTurn) + 1, kMostParts));

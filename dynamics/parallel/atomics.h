@@ -51,6 +51,17 @@ TANDEM_HD inline std::uint32_t atomic_add(std::uint32_t& of, std::uint32_t x) {
 #endif
 }
 
+/// Adds 1 where less than `most` is seen, so that a count becomes no less than `most` if it would without
+/// that. A count that has reached it is only looked at.
+TANDEM_HD inline void add_up_to(std::uint32_t& of, std::uint32_t most) {
+#ifdef __CUDA_ARCH__
+  const std::uint32_t seen = *static_cast<volatile std::uint32_t*>(&of);
+#else
+  const std::uint32_t seen = std::atomic_ref<std::uint32_t>(of).load(std::memory_order_relaxed);
+#endif
+  if (seen < most) atomic_add(of, 1);
+}
+
 TANDEM_HD inline void atomic_or(std::uint32_t& of, std::uint32_t bits) {
 #ifdef __CUDA_ARCH__
   if ((*static_cast<volatile std::uint32_t*>(&of) & bits) != bits) atomicOr(&of, bits);

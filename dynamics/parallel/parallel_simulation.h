@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "dynamics/parallel/newton_step.h"
 #include "dynamics/parallel/pair_step.h"
 #include "dynamics/parallel/sleep_step.h"
 #include "dynamics/parallel/soft_step.h"
@@ -37,7 +38,7 @@ struct ParallelBodies {
 
 struct ParallelOptions {
   Vector3 gravity = {0, 0, -9.81};
-  SolverOptions solver;  ///< soft contacts for all islands, whatever `kind` says
+  SolverOptions solver;
   SleepOptions sleep;
 };
 
@@ -108,6 +109,8 @@ class ParallelSimulation {
   std::uint32_t bodies() const { return bodies_; }
   std::uint32_t bad_body() const { return read_.bad_body; }
   const StepCounts& counts() const { return read_; }  ///< of the last step
+  /// Returns what Newton's method did in the last step. Condition: the solver is not SolverKind::soft.
+  const NewtonNeeds& newton() const { return newton_needs_; }
 
   /// The arrays of the last step, whose results are those of the step before now.
   StepArrays arrays(double dt = 0) const {
@@ -142,6 +145,8 @@ class ParallelSimulation {
  private:
   template <typename T>
   using Array = typename Executor::template Array<T>;
+
+  static constexpr std::uint32_t kNewtonUnits = (4u << 20) / NewtonNeeds::kUnit;  // to begin with
 
   // Parts of a step that are queued together.
   enum Part { kFind, kAddMissed, kSolve, kFinish, kParts };
@@ -182,15 +187,30 @@ class ParallelSimulation {
   }
 
   void solve(const StepArrays& a) {
-    solver_.step(to_,
-                 {a.acting, a.start, a.pulls, a.bodies, a.contacts, a.impulses_before, a.touching,
-                  &a.counts->touching, a.most_pairs, a.dt},
-                 a.options, {a.end, a.impulses, a.done});
+    const SoftStepOutput output = {a.end, a.impulses, a.done};
+    SoftStepInput input = {a.acting,     a.start,
+                           a.pulls,      a.bodies,
+                           a.contacts,   a.impulses_before,
+                           a.touching,   &a.counts->touching,
+                           a.most_pairs, a.dt};
+    if (has_newton()) input = newton_.step(to_, input, a.options, output);
+    solver_.step(to_, input, a.options, output);
+  }
+
+  bool has_newton() const { return options_.solver.kind != SolverKind::soft; }
+
+  // Makes room for the bodies and pairs of a solver.
+  Status reserve_solvers() {
+    const std::uint32_t units = std::max(newton_.units(), kNewtonUnits);
+    const Status status = has_newton() ? newton_.reserve(to_, bodies_, most_pairs_, units) : Status::kOk;
+    return status == Status::kOk ? solver_.reserve(to_, usual_room(bodies_, most_pairs_, most_remembered_))
+                                 : status;
   }
 
   void queue_reading() {
     to_.copy_later(counts_.data(), read_);
     to_.copy_later(solver_.needs(), solver_needs_);
+    if (has_newton()) to_.copy_later(newton_.needs(), newton_needs_);
     ask_.read_needs();
   }
 
@@ -217,6 +237,11 @@ class ParallelSimulation {
     if (status == Status::kOk && !grew && solver_needs_.has_room == 0) {
       grew = true;
       status = solver_.reserve(to_, larger_room(solver_.room(), solver_needs_));
+    }
+    if (status == Status::kOk && !grew && has_newton() && newton_needs_.has_room == 0) {
+      grew = true;
+      const std::uint32_t units = newton_needs_.units + newton_needs_.units / 4;
+      status = newton_.reserve(to_, bodies_, most_pairs_, units);
     }
     whole = !grew;
     if (grew) ++generation_;
@@ -277,8 +302,7 @@ class ParallelSimulation {
       if (out == Status::kOk) out = status;
     }
     most_pairs_ = out == Status::kOk ? pairs : 0;
-    return out == Status::kOk ? solver_.reserve(to_, usual_room(bodies_, most_pairs_, most_remembered_))
-                              : out;
+    return out == Status::kOk ? reserve_solvers() : out;
   }
 
   Status reserve_moved(std::uint32_t rows) {
@@ -309,18 +333,20 @@ class ParallelSimulation {
     }
     if (out != Status::kOk) return out;
     most_found_ = found, most_remembered_ = remembered;
-    return solver_.reserve(to_, usual_room(bodies_, most_pairs_, most_remembered_));
+    return reserve_solvers();
   }
 
   Executor& to_;
   Questions& ask_;
   ParallelSoftStep<Executor> solver_;
+  ParallelNewtonStep<Executor> newton_;
   ParallelOptions options_;
   std::uint32_t bodies_ = 0, most_pairs_ = 0, most_moved_ = 0, most_found_ = 0, most_remembered_ = 0;
   double within_ = 0;  // how far apart near pairs are
   bool has_forces_ = false;
   StepCounts read_ = {};
   SoftStepNeeds solver_needs_ = {};
+  NewtonNeeds newton_needs_ = {};
   double dt_ = 0;
   std::uint64_t generation_ = 0;  // of all that is queued, memory included
   int parity_ = 0;                // of the step: records change places

@@ -22,7 +22,19 @@ struct SoftStepInput {
   const std::uint32_t* pair_count;  ///< how many
   std::uint32_t most_pairs;         ///< how many there is room for
   double dt;
+  const std::uint8_t* is_solved = nullptr;  ///< bodies that have their states at the end; null: none has
 };
+
+/// Returns the numbers that rows are made of.
+inline StepNumbers step_numbers(const SoftStepInput& input, const SolverOptions& options) {
+  StepNumbers step;
+  step.bodies = {input.bodies, input.body_count};
+  step.contacts = {input.contacts, std::size_t{1} << 32};  // more than numbers of 32 bits can name
+  step.pulls = {input.pulls, input.body_count};
+  step.states = {input.states, input.body_count};
+  step.dt = input.dt, step.options = options;
+  return step;
+}
 
 /// What a step writes. Each array may be the one of the input that it follows from.
 struct SoftStepOutput {
@@ -126,6 +138,7 @@ TANDEM_HD inline void fill_lane(const SoftStepView& view, std::uint32_t i) {
 
 TANDEM_HD inline void end_body(const SoftStepView& view, std::uint32_t i) {
   if (view.groups.needs->has_room == 0) return;
+  if (view.input.is_solved != nullptr && view.input.is_solved[i] != 0) return;
   const BodyProperties& body = view.input.bodies[i];
   BodyState state = view.input.states[i];
   if (view.is_held(i))
@@ -224,13 +237,7 @@ class ParallelSoftStep {
  private:
   SoftStepView view_of(const SoftStepInput& input, const SolverOptions& options,
                        const SoftStepOutput& output) const {
-    StepNumbers step;
-    step.bodies = {input.bodies, input.body_count};
-    step.contacts = {input.contacts, std::size_t{1} << 32};  // more than numbers of 32 bits can name
-    step.pulls = {input.pulls, input.body_count};
-    step.states = {input.states, input.body_count};
-    step.dt = input.dt, step.options = options;
-    const SoftNumbers numbers(step, input.start_impulses);
+    const SoftNumbers numbers(step_numbers(input, options), input.start_impulses);
     const SoftRows rows = {
         nullptr,         nullptr,      groups_.data(),    turnings_.data(),
         normals_.data(), gaps_.data(), frictions_.data(), static_cast<float>(1 / numbers.h)};

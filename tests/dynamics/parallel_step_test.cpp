@@ -20,7 +20,8 @@ bool same_bytes(const BodyState& p, const BodyState& q) {
 // Moves the same bodies by a Simulation and by a parallel simulation on threads of the CPU.
 class BothWays {
  public:
-  explicit BothWays(const FallingBodies& of, const WorldOptions& options = {}, std::uint32_t threads = 1)
+  explicit BothWays(const FallingBodies& of, const WorldOptions& options = {}, std::uint32_t threads = 1,
+                    SolverKind kind = SolverKind::soft)
       : threads_(threads),
         executor_(threads_),
         questions_(of.assets.views()),
@@ -28,7 +29,7 @@ class BothWays {
     WorldSetup setup;
     std::uint64_t where = 0;
     EXPECT_EQ(set_up(of.assets.views(), of.descriptions, options, {}, setup, where), Status::kOk);
-    setup.options.solver.kind = SolverKind::soft;
+    setup.options.solver.kind = kind;
     const std::vector<double> inner = inner_radii(of.assets.views());
     std::vector<AssetBox> boxes;
     for (const AssetView& view : of.assets.views())
@@ -114,6 +115,27 @@ TEST(ParallelStep, IsMadeAgainWhereRoomIsShort) {
   BothWays both(many, {}, 2);
   for (int step = 0; step < 3 && !HasFatalFailure(); ++step) both.step(step);
   EXPECT_GT(both.parallel.counts().pairs, 8 * 700u);
+}
+
+// Boxes on each other, askew, in a tower.
+void add_tower(FallingBodies& to, double x, double y, int count) {
+  for (int i = 0; i < count; ++i) {
+    BodyDescription& body = to.descriptions.emplace_back();
+    body.asset = 3, body.pose = shift(x + 1e-3 * (i % 3), y, 0.1 + 0.20001 * i);
+  }
+}
+
+TEST(ParallelStep, SolvesATowerByNewtonsMethod) {
+  FallingBodies tower(1);
+  add_tower(tower, 0, 0, 30);
+  BothWays both(tower, {.sleeping = false}, 1, SolverKind::automatic);
+  for (int step = 0; step < 120 && !HasFatalFailure(); ++step) {
+    both.step(step);
+    if (step > 1) {
+      ASSERT_EQ(both.parallel.newton().solved, 1u) << step;
+    }
+  }
+  EXPECT_NEAR(both.states()[30].position.z, 0.1 + 29 * 0.20001, 1e-3);
 }
 
 }  // namespace

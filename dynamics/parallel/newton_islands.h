@@ -23,8 +23,7 @@ struct NewtonNeeds {
   std::uint32_t has_room;   ///< 0 where there was too little: islands without room are not solved then
   std::uint32_t islands;    ///< that were looked at
   std::uint32_t solved;     ///< of these
-  std::uint32_t spinning;   ///< that were left to soft steps because they need a step in parts
-  std::uint32_t failed;     ///< because they did not converge
+  std::uint32_t failed;     ///< that were left to soft steps because they did not converge
   std::uint32_t too_large;  ///< islands that were not looked at because of their size
 
   static constexpr std::uint32_t kUnit = 64;
@@ -44,10 +43,10 @@ struct NewtonIslandsView {
   NewtonNeeds* needs;
   std::uint32_t *listed_bodies, *listed_pairs;  // how many are listed
   // Of each body:
-  std::uint32_t* label;                              // see labels.h
+  std::uint32_t* label;                               // see labels.h
   std::uint32_t *bodies_of, *pairs_of, *contacts_of;  // of the island whose first body it is
-  std::uint32_t* island_of;                          // the same; kNone: it is not looked at
-  std::uint32_t *layer, *place;                      // place: in its island, from 1
+  std::uint32_t* island_of;                           // the same; kNone: it is not looked at
+  std::uint32_t *layer, *place;                       // place: in its island, from 1
   std::uint8_t* is_solved;
   // Islands have parts of these, with an element for each body. found: in any order; order: in that of the
   // island; reach: the last body that each has something to do with, as its place less 1.
@@ -105,8 +104,9 @@ TANDEM_HD inline void begin_island(const NewtonIslandsView& view, std::uint32_t 
   // Layers have at least a body each.
   if (pairs == 0 || !(takes_all || is_slender(bodies * elimination_work(1), contacts))) return;
   const std::uint32_t island = atomic_add(view.needs->islands, 1);
-  view.islands[island] = {i,     atomic_add(*view.listed_bodies, bodies), bodies, atomic_add(*view.listed_pairs, pairs),
-                          pairs, contacts};
+  view.islands[island] = {i,      atomic_add(*view.listed_bodies, bodies),
+                          bodies, atomic_add(*view.listed_pairs, pairs),
+                          pairs,  contacts};
   view.island_of[i] = island;
   view.bodies_of[i] = view.pairs_of[i] = 0;  // that are listed so far
 }
@@ -134,7 +134,7 @@ void find_newton_islands(Executor& executor, const NewtonIslandsView& all, std::
   const NewtonIslandsView view = all;
   const ContactPairs& pairs = view.pairs;
   executor.once([=] TANDEM_HD() {
-    *view.needs = {0, 1, 0, 0, 0, 0, 0};
+    *view.needs = {0, 1, 0, 0, 0, 0};
     *view.listed_bodies = *view.listed_pairs = 0;
   });
   executor.for_each(nullptr, bodies, [=] TANDEM_HD(std::uint32_t i) { begin_body(view, i); });

@@ -3,141 +3,21 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "dynamics/parallel/newton_islands.h"
-#include "dynamics/parallel/soft_step.h"
+#include "dynamics/parallel/newton_solve.h"
 
 namespace tandem::dynamics {
-
-/// All that solving islands reads and writes.
-struct NewtonStepView {
-  NewtonIslandsView islands;
-  StepNumbers step;
-  SoftStepInput input;
-  SoftStepOutput output;
-  std::byte* memory;
-  std::uint32_t units;  // of memory, that there are
-
-  TANDEM_HD bool takes_all() const { return step.options.kind == SolverKind::newton; }
-};
-
-/// What the threads of a team share of an island.
-struct NewtonShared {
-  ContactIsland island;
-  NewtonScratch scratch;
-  std::uint32_t first_unit;
-};
-
-namespace newton_step_detail {
-
-TANDEM_HD inline void carve(NewtonShared& shared, Carver& carver, const NewtonIsland& of,
-                            std::uint32_t blocks) {
-  shared.island.carve(carver, of.bodies + 1, of.contacts, of.pairs);
-  shared.scratch.carve(carver, shared.island, blocks);
-}
-
-/// Gives the island memory. Result: false if there is too little.
-template <typename Team>
-TANDEM_HD bool take_memory(const Team& team, const NewtonStepView& view, const NewtonIsland& of,
-                           std::uint32_t blocks, NewtonShared& shared) {
-  constexpr std::uint32_t kTooMany = 0xFFFFFFFFu;
-  if (team.rank() == 0) {
-    NewtonNeeds& needs = *view.islands.needs;
-    Carver counting(nullptr);
-    carve(shared, counting, of, blocks);
-    const auto units = static_cast<std::uint32_t>((counting.bytes() + NewtonNeeds::kUnit - 1) / NewtonNeeds::kUnit);
-    const std::uint32_t first = atomic_add(needs.units, units);
-    const bool has_room = first + units >= first && first + units <= view.units;
-    shared.first_unit = has_room ? first : kTooMany;
-    if (!has_room) atomic_least(needs.has_room, 0);
-    if (has_room) {
-      Carver carver(view.memory + std::size_t{NewtonNeeds::kUnit} * first);
-      carve(shared, carver, of, blocks);
-    }
-  }
-  team.barrier();
-  return shared.first_unit != kTooMany;
-}
-
-template <typename Team>
-TANDEM_HD void fill(const Team& team, const NewtonStepView& view, const NewtonIslandPlan<Team>& plan,
-                    const NewtonShared& shared) {
-  const ContactIsland& island = shared.island;
-  const RowMaker rows(view.step);
-  if (team.rank() == 0) {
-    island.bodies[0] = 0;
-    for (std::uint32_t k = 0, begin = 0; k < island.pair_count(); begin = island.pairs[k++].end)
-      island.pairs[k].begin = begin, island.pairs[k].end = begin + plan.pair(k).count;
-  }
-  team.each(plan.island().bodies, [&](std::uint32_t k) { island.bodies[k + 1] = plan.body(k); });
-  team.barrier();
-  team.each(island.pair_count(), [&](std::uint32_t k) {
-    TouchingPair& pair = island.pairs[k];
-    const ContactPair& from = plan.pair(k);
-    pair.a = plan.place_of(from.a), pair.b = plan.place_of(from.b);
-    for (std::uint32_t i = pair.begin; i < pair.end; ++i) island.contacts[i] = from.first + (i - pair.begin);
-  });
-  team.each(island.body_count(), [&](std::uint32_t j) { fill_island_body(rows, island, j); });
-  team.barrier();
-  plan.write_columns(shared.scratch.convex.matrix);
-  list_pairs_of_bodies(team, island);
-  team.each(island.pair_count(), [&](std::uint32_t k) {
-    fill_island_pair(rows, view.input.contacts, view.input.start_impulses, island, island.pairs[k]);
-  });
-  team.barrier();
-}
-
-template <typename Team>
-TANDEM_HD void write(const Team& team, const NewtonStepView& view, const NewtonIslandPlan<Team>& plan,
-                     const ContactIsland& island) {
-  team.each(plan.island().bodies, [&](std::uint32_t k) {
-    const std::uint32_t body = island.bodies[k + 1];
-    BodyState state = view.input.states[body];
-    move_island_body(island, view.step, k + 1, state);
-    view.output.states[body] = state;
-    view.islands.is_solved[body] = 1;
-  });
-  team.each(island.pair_count(), [&](std::uint32_t k) {
-    write_island_pair(island, island.pairs[k], view.output.impulses);
-    if (view.output.done != nullptr) write_island_pair(island, island.pairs[k], view.output.done);
-    view.islands.is_pair_solved[plan.number_of_pair(k)] = 1;
-  });
-}
-
-}  // namespace newton_step_detail
-
-/// Solves an island if it is slender, has room, and converges.
-template <typename Team>
-TANDEM_HD void solve_newton_island(const Team& team, const NewtonStepView& view, std::uint32_t island,
-                                   NewtonShared& shared) {
-  using namespace newton_step_detail;
-  NewtonNeeds& needs = *view.islands.needs;
-  const NewtonIslandPlan<Team> plan(team, view.islands, island);
-  if (!plan.find_layers(view.takes_all())) return;
-  if (parts_for(plan.most_turn(view.input.contacts, view.step.states, view.step.dt)) > 1) {
-    if (team.rank() == 0) atomic_add(needs.spinning, 1);
-    return;
-  }
-  if (!take_memory(team, view, plan.island(), plan.put_in_order(), shared)) return;
-  fill(team, view, plan, shared);
-  NoJoints none;
-  NewtonStep<Team, NoJoints> step(team, shared.island, shared.scratch, view.step, view.step.options.correction,
-                                  none);
-  const bool solved = step.solve();
-  if (solved) write(team, view, plan, shared.island);
-  if (team.rank() == 0) atomic_add(solved ? needs.solved : needs.failed, 1);
-}
 
 struct SolveNewtonIslands {
   NewtonStepView view;
   template <typename Team>
   TANDEM_HD void operator()(const Team& team, std::uint32_t island, NewtonShared& shared) const {
-    solve_newton_island(team, view, island, shared);
+    NewtonIslandStep<Team>(team, view, island, shared).solve();
   }
 };
 
 /// Solves slender islands by Newton's method, a team each, as IslandSolver does islands without joints.
-/// Islands that need a step in parts, or have more bodies or pairs than kMostNewtonBodies and
-/// kMostNewtonPairs, are left to soft steps. Nothing waits for a GPU but reserve().
+/// Islands that have more bodies or pairs than kMostNewtonBodies and kMostNewtonPairs are left to soft steps.
+/// Nothing waits for a GPU but reserve().
 template <typename Executor>
 class ParallelNewtonStep {
  public:
@@ -161,8 +41,8 @@ class ParallelNewtonStep {
   /// What the last step needed and did, in the executor's memory.
   const NewtonNeeds* needs() const { return needs_.data(); }
 
-  /// Solves islands; the result is what is left to soft steps. Condition: there is room for all bodies and for
-  /// input.most_pairs pairs.
+  /// Solves islands; the result is what is left to soft steps. Condition: there is room for all bodies and
+  /// for input.most_pairs pairs.
   SoftStepInput step(Executor& executor, const SoftStepInput& input, const SolverOptions& options,
                      const SoftStepOutput& output) {
     const NewtonStepView view = view_of(input, options, output);

@@ -67,7 +67,7 @@ void expect_same(const HeapResult& is, const HeapResult& wanted) {
 
 void expect_same_as_soft_solver(const HeapOptions& options) {
   const RandomHeap heap(options);
-  const HeapResult wanted = soft_solution(heap);
+  const HeapResult wanted = solution(heap);
   EXPECT_TRUE(std::ranges::all_of(wanted.states, is_usable));
   for (const std::uint32_t threads : {1u, 3u}) {
     SCOPED_TRACE(threads);
@@ -99,7 +99,7 @@ TEST(ParallelSoftStep, FollowsTheNumberOfSubsteps) {
   for (const std::uint32_t substeps : {1u, 5u}) {
     RandomHeap heap({.bodies = 80, .pairs = 200});
     heap.options.substeps = substeps;
-    expect_same(parallel_solution(heap, 1), soft_solution(heap));
+    expect_same(parallel_solution(heap, 1), solution(heap));
   }
 }
 
@@ -127,7 +127,7 @@ TEST(ParallelSoftStep, SaysWhatItNeedsWhereThereIsTooLittleRoom) {
   ASSERT_EQ(step.reserve(executor, room), Status::kOk);
   make_step(step, executor, heap, out);
   EXPECT_EQ(step.needs()->has_room, 1u);
-  expect_same(out, soft_solution(heap));
+  expect_same(out, solution(heap));
 }
 
 TEST(ParallelSoftStep, SolvesOneStepAfterAnother) {
@@ -142,7 +142,7 @@ TEST(ParallelSoftStep, SolvesOneStepAfterAnother) {
     ASSERT_EQ(step.reserve(executor, room), Status::kOk);
     make_step(step, executor, heap, out);
     ASSERT_EQ(step.needs()->has_room, 1u);
-    expect_same(out, soft_solution(heap));
+    expect_same(out, solution(heap));
   }
 }
 

@@ -138,5 +138,40 @@ TEST(ParallelStep, SolvesATowerByNewtonsMethod) {
   EXPECT_NEAR(both.states()[30].position.z, 0.1 + 29 * 0.20001, 1e-3);
 }
 
+TEST(ParallelStep, HeavyStandsOnLightAsInASimulation) {
+  FallingBodies tower(1);
+  add_tower(tower, 0, 0, 3);
+  tower.descriptions.back().density = 1e7;
+  BothWays both(tower, {.sleeping = false}, 1, SolverKind::automatic);
+  for (int step = 0; step < 240 && !HasFatalFailure(); ++step) both.step(step);
+  EXPECT_NEAR(both.states()[3].position.z, 0.1 + 2 * 0.20001, 1e-3);
+}
+
+// A heap of soft contacts beside towers, and bodies that fall asleep.
+TEST(ParallelStep, SolvesTowersBesideAHeapAsASimulationDoes) {
+  FallingBodies bodies(40, 3);
+  add_tower(bodies, 8, 0, 10), add_tower(bodies, 10, 0, 6);
+  BothWays both(bodies, {}, 2, SolverKind::automatic);
+  std::uint32_t islands = 0, solved = 0;
+  for (int step = 0; step < 240 && !HasFatalFailure(); ++step) {
+    both.step(step);
+    islands += both.parallel.newton().islands, solved += both.parallel.newton().solved;
+  }
+  EXPECT_GT(solved, 1000u);
+  EXPECT_GT(islands, solved);
+}
+
+TEST(ParallelStep, IsMadeAgainWhereNewtonsMethodHasTooLittleRoom) {
+  FallingBodies towers(1);
+  for (int i = 0; i < 150; ++i) add_tower(towers, 0.7 * (i % 10) - 3, 0.6 * (i / 10) - 4, 8);
+  BothWays both(towers, {}, 2, SolverKind::automatic);
+  std::uint32_t units = 0;
+  for (int step = 0; step < 3 && !HasFatalFailure(); ++step) {
+    both.step(step);
+    units = std::max(units, both.parallel.newton().units);
+  }
+  EXPECT_GT(units, (4u << 20) / NewtonNeeds::kUnit);
+}
+
 }  // namespace
 }  // namespace tandem::test

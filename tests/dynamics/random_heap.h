@@ -103,8 +103,8 @@ struct HeapResult {
   std::vector<ContactImpulse> impulses, done;
 };
 
-/// A step of the heap as the CPU makes it.
-inline HeapResult soft_solution(const RandomHeap& heap, std::uint32_t thread_count = 1) {
+/// Returns a step of the heap as the CPU makes it, by the solver of the heap's options.
+inline HeapResult solution(const RandomHeap& heap, std::uint32_t thread_count = 1) {
   Threads threads(thread_count);
   std::vector<ContactImpulse> done = heap.impulses;
   HeapResult out = {heap.states, heap.impulses, {}};

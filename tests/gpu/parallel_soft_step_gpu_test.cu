@@ -44,7 +44,7 @@ void expect_same_as_soft_solver(const HeapOptions& options) {
   HeapResult is;
   ASSERT_EQ(gpu.make_step(), Status::kOk);
   ASSERT_EQ(gpu.read(is), Status::kOk);
-  expect_same(is, soft_solution(heap));
+  expect_same(is, solution(heap));
 }
 
 TEST_F(GpuSoftStep, GivesTheVelocitiesAndImpulsesOfSoftSolver) {
@@ -81,7 +81,7 @@ TEST_F(GpuSoftStep, CanBeCapturedInAGraph) {
   for (int i = 0; i < 3; ++i) ASSERT_EQ(graph.launch(stream.get()), cudaSuccess);
   HeapResult is;
   ASSERT_EQ(gpu.read(is), Status::kOk);
-  expect_same(is, soft_solution(heap));
+  expect_same(is, solution(heap));
 }
 
 }  // namespace

@@ -29,19 +29,50 @@ TANDEM_HD inline double* numbers_of(Vector6& v) {
 template <typename Team>
 inline constexpr std::uint32_t kPartsOfBlock = Team::kIsMany ? 6 : 1;
 
+/// The rows of a block that a thread of a team sums up.
+template <typename Team>
+struct BlockPart {
+  static constexpr std::uint32_t kRows = 6 / kPartsOfBlock<Team>;
+
+  std::uint32_t first;  // row
+  double at[kRows][6];
+
+  TANDEM_HD explicit BlockPart(std::uint32_t part) : first(part * kRows), at{} {}
+
+  /// Adds these rows of the identity.
+  TANDEM_HD void add_identity() {
+    for (std::uint32_t i = 0; i < kRows; ++i) {
+      for (std::uint32_t j = 0; j < 6; ++j) at[i][j] += first + i == j ? 1 : 0;
+    }
+  }
+  /// Adds weight left right^T.
+  TANDEM_HD void add(double weight, const Vector6& left, const Vector6& right) {
+    const double* const q = numbers_of(right);
+    for (std::uint32_t i = 0; i < kRows; ++i) {
+      const double by = weight * numbers_of(left)[first + i];
+      for (int j = 0; j < 6; ++j) at[i][j] += by * q[j];
+    }
+  }
+  TANDEM_HD void write(Matrix6& to) const {
+    for (std::uint32_t i = 0; i < kRows; ++i) {
+      for (int j = 0; j < 6; ++j) to.at[first + i][j] = at[i][j];
+    }
+  }
+};
+
 /// Calls visit(k) for each row k of a part of a block.
 template <typename Team, typename Visit>
 TANDEM_HD void for_rows_of_part(std::uint32_t part, const Visit& visit) {
-  constexpr std::uint32_t kRows = 6 / kPartsOfBlock<Team>;
+  constexpr std::uint32_t kRows = BlockPart<Team>::kRows;
   for (std::uint32_t k = 0; k < kRows; ++k) visit(part * kRows + k);
 }
 
-/// m += weight left right^T, in one of its rows.
-TANDEM_HD inline void add_product(Matrix6& m, std::uint32_t row, double weight, const Vector6& left,
-                                  const Vector6& right) {
-  const double by = weight * numbers_of(left)[row];
-  const double* const q = numbers_of(right);
-  for (int j = 0; j < 6; ++j) m.at[row][j] += by * q[j];
+/// m += weight left right^T
+TANDEM_HD inline void add_product(Matrix6& m, double weight, const Vector6& left, const Vector6& right) {
+  const double *const p = numbers_of(left), *const q = numbers_of(right);
+  for (int i = 0; i < 6; ++i) {
+    for (int j = 0; j < 6; ++j) m.at[i][j] += weight * p[i] * q[j];
+  }
 }
 
 /// m -= p q^T, in one of its rows.
@@ -72,10 +103,13 @@ TANDEM_HD inline bool factorise_block(Matrix6& m) {
 
 /// A row x becomes x L^-T, so as a column it becomes L^-1 x.
 TANDEM_HD inline void divide_by_transposed(double* x, const Matrix6& lower) {
+  double own[6];
   for (int j = 0; j < 6; ++j) {
-    for (int k = 0; k < j; ++k) x[j] -= x[k] * lower.at[j][k];
-    x[j] /= lower.at[j][j];
+    own[j] = x[j];
+    for (int k = 0; k < j; ++k) own[j] -= own[k] * lower.at[j][k];
+    own[j] /= lower.at[j][j];
   }
+  for (int j = 0; j < 6; ++j) x[j] = own[j];
 }
 
 /// A sparse symmetric matrix of 6 x 6 blocks: one for each body of an island and one for each two that touch
@@ -158,7 +192,9 @@ struct BlockMatrix {
         double* const other = numbers_of(x[rows[first + i / kParts]]);
         const double* const by = numbers_of(x[j]);
         for_rows_of_part<Team>(i % kParts, [&](std::uint32_t row) {
-          for (int k = 0; k < 6; ++k) other[row] -= blocks[first + i / kParts].at[row][k] * by[k];
+          double own_of_other = other[row];
+          for (int k = 0; k < 6; ++k) own_of_other -= blocks[first + i / kParts].at[row][k] * by[k];
+          other[row] = own_of_other;
         });
       });
       team.barrier();
@@ -167,7 +203,8 @@ struct BlockMatrix {
   }
 
   TANDEM_HD void substitute_back(std::span<Vector6> x, std::uint32_t j) const {
-    double* const own = numbers_of(x[j]);
+    double own[6];
+    for (int i = 0; i < 6; ++i) own[i] = numbers_of(x[j])[i];
     for (std::uint32_t p = begin[j]; p < begin[j + 1]; ++p) {
       const double* const other = numbers_of(x[rows[p]]);
       for (int i = 0; i < 6; ++i) {
@@ -178,6 +215,7 @@ struct BlockMatrix {
       for (int k = i + 1; k < 6; ++k) own[i] -= diagonal[j].at[k][i] * own[k];
       own[i] /= diagonal[j].at[i][i];
     }
+    for (int i = 0; i < 6; ++i) numbers_of(x[j])[i] = own[i];
   }
 };
 

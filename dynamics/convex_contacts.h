@@ -221,26 +221,26 @@ class ConvexContacts {
     team_.barrier();
     const BlockMatrix& matrix = with_.matrix;
     team_.each(moved_count() * kParts, [&](std::uint32_t i) {
-      Matrix6& m = matrix.diagonal[i / kParts];
       const std::uint32_t j = i / kParts + 1;
-      for_rows_of_part<Team>(i % kParts, [&](std::uint32_t row) {
-        for (std::uint32_t k = 0; k < 6; ++k) m.at[row][k] = row == k ? 1 : 0;
-      });
-      if constexpr (Joints::kAny) joints_.add_nearness(j, m);
+      BlockPart<Team> sum(i % kParts);
+      sum.add_identity();
+      if constexpr (Joints::kAny) joints_.add_nearness(j, sum);
       island_.pairs_of(j, [&](const TouchingPair& pair, std::uint32_t) {
-        add_contacts(m, i % kParts, pair, pair.a == j, pair.a == j);
+        add_contacts(sum, pair, pair.a == j, pair.a == j);
       });
       island_.pairs_of(j, [&](const TouchingPair& pair, std::uint32_t number) {
-        add_turning(m, i % kParts, pair, number, pair.a == j, pair.a == j);
+        add_turning(sum, pair, number, pair.a == j, pair.a == j);
       });
+      sum.write(matrix.diagonal[j - 1]);
     });
     // Of a block the rows are those of the body further on.
     team_.each(island_.pair_count() * kParts, [&](std::uint32_t i) {
       const TouchingPair& pair = island_.pairs[i / kParts];
       if (pair.a == 0 || pair.b == 0) return;
-      Matrix6& m = matrix.blocks[with_.block_of_pair[i / kParts]];
-      add_contacts(m, i % kParts, pair, pair.a > pair.b, pair.a < pair.b);
-      add_turning(m, i % kParts, pair, i / kParts, pair.a > pair.b, pair.a < pair.b);
+      BlockPart<Team> sum(i % kParts);
+      add_contacts(sum, pair, pair.a > pair.b, pair.a < pair.b);
+      add_turning(sum, pair, i / kParts, pair.a > pair.b, pair.a < pair.b);
+      sum.write(matrix.blocks[with_.block_of_pair[i / kParts]]);
     });
     if constexpr (Joints::kAny) joints_.add_curvature(matrix);
     team_.barrier();
@@ -269,35 +269,31 @@ class ConvexContacts {
     });
   }
 
-  // Adds what the contacts of a pair do to a part of a block: rows of a or of b, columns of a or of b.
-  TANDEM_HD void add_contacts(Matrix6& m, std::uint32_t part, const TouchingPair& pair, bool rows_of_a,
+  // Adds what the contacts of a pair do to a block with rows of a or of b, and columns of a or of b.
+  TANDEM_HD void add_contacts(BlockPart<Team>& sum, const TouchingPair& pair, bool rows_of_a,
                               bool columns_of_a) const {
     const auto left = [&](const ContactRow& row) -> const Vector6& { return rows_of_a ? row.a : row.b; };
     const auto right = [&](const ContactRow& row) -> const Vector6& { return columns_of_a ? row.a : row.b; };
     for (std::uint32_t i = pair.begin; i < pair.end; ++i) {
       const ContactRow &n = island_.normal[i], &f = island_.first[i], &s = island_.second[i];
       const ContactSlope& slope = with_.slope[i];
-      for_rows_of_part<Team>(part, [&](std::uint32_t row) {
-        if (slope.normal > 0) add_product(m, row, slope.normal, left(n), right(n));
-        if (slope.first != 0) add_product(m, row, slope.first, left(f), right(f));
-        if (slope.second != 0) add_product(m, row, slope.second, left(s), right(s));
-        if (slope.both == 0) return;
-        add_product(m, row, slope.both, left(f), right(s));
-        add_product(m, row, slope.both, left(s), right(f));
-      });
+      if (slope.normal > 0) sum.add(slope.normal, left(n), right(n));
+      if (slope.first != 0) sum.add(slope.first, left(f), right(f));
+      if (slope.second != 0) sum.add(slope.second, left(s), right(s));
+      if (slope.both == 0) continue;
+      sum.add(slope.both, left(f), right(s));
+      sum.add(slope.both, left(s), right(f));
     }
   }
 
-  TANDEM_HD void add_turning(Matrix6& m, std::uint32_t part, const TouchingPair& pair, std::uint32_t number,
+  TANDEM_HD void add_turning(BlockPart<Team>& sum, const TouchingPair& pair, std::uint32_t number,
                              bool rows_of_a, bool columns_of_a) const {
     for (int k = 0; k < 3; ++k) {
       for (int j = 0; j < 3; ++j) {
         const double slope = at(with_.turning_slope[number].row[k], j);
         if (slope == 0) continue;
-        for_rows_of_part<Team>(part, [&](std::uint32_t row) {
-          add_product(m, row, slope, rows_of_a ? pair.turn[j].a : pair.turn[j].b,
-                      columns_of_a ? pair.turn[k].a : pair.turn[k].b);
-        });
+        sum.add(slope, rows_of_a ? pair.turn[j].a : pair.turn[j].b,
+                columns_of_a ? pair.turn[k].a : pair.turn[k].b);
       }
     }
   }

@@ -120,11 +120,11 @@ class ConvexJoints {
   double curvature_of_nearness(std::size_t j, const Vector6& way) const {
     return near_.empty() ? 0 : dot(drawn_by(j, way), way);
   }
-  void add_nearness(std::size_t j, Matrix6& m) const {
+  void add_nearness(std::size_t j, BlockPart<SerialTeam>& sum) const {
     if (near_.empty()) return;
     for (const Vector3& axis : Matrix3::identity().row) {
       const Vector6 unit = {{}, axis};
-      add_block(m, drawn_by(j, unit), unit, 1);
+      sum.add(1, drawn_by(j, unit), unit);
     }
   }
 
@@ -144,13 +144,13 @@ class ConvexJoints {
       const double slope = slope_at(i, w_[i]);
       if (!(slope > 0)) continue;
       const Vector6 &a = row.gradient.a, &b = row.gradient.b;
-      if (row.a > 0) add_block(matrix.diagonal[row.a - 1], a, a, slope);
-      if (row.b > 0) add_block(matrix.diagonal[row.b - 1], b, b, slope);
+      if (row.a > 0) add_product(matrix.diagonal[row.a - 1], slope, a, a);
+      if (row.b > 0) add_product(matrix.diagonal[row.b - 1], slope, b, b);
       if (row.a == 0 || row.b == 0) continue;
       if (row.a < row.b)
-        add_block(matrix.beside(row.a - 1, row.b - 1), b, a, slope);
+        add_product(matrix.beside(row.a - 1, row.b - 1), slope, b, a);
       else
-        add_block(matrix.beside(row.b - 1, row.a - 1), a, b, slope);
+        add_product(matrix.beside(row.b - 1, row.a - 1), slope, a, b);
     }
   }
 
@@ -169,10 +169,6 @@ class ConvexJoints {
  private:
   // Joints are never slack, so a softness that contacts could not have does them good.
   static constexpr double kSoftness = 1e-7;
-
-  static void add_block(Matrix6& m, const Vector6& left, const Vector6& right, double weight) {
-    for (std::uint32_t row = 0; row < 6; ++row) add_product(m, row, weight, left, right);
-  }
 
   Vector6 drawn_by(std::size_t j, const Vector6& way) const {
     const Matrix3& spread = problem_.stepped[j].scale.spread;

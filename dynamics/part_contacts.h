@@ -28,8 +28,8 @@ struct PartContacts {
     carver.take(count, impulses), carver.take(count, sums);
   }
 
-  /// Begins the first of so many parts for contact i. impulse: that the whole step starts with. states: of the
-  /// bodies that contacts name.
+  /// Begins the first of so many parts for contact i. impulse: that the whole step starts with. states: of
+  /// the bodies that contacts name.
   TANDEM_HD void begin(std::uint32_t i, const ContactPoint& contact, const ContactImpulse& impulse,
                        std::uint32_t parts, std::span<const BodyState> states) const {
     contacts[i] = contact;

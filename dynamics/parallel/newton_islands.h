@@ -60,7 +60,9 @@ struct NewtonIslandsView {
   TANDEM_HD std::uint32_t label_of(const ContactPair& pair) const {
     return label[is_moved(pair.a) ? pair.a : pair.b];
   }
-  TANDEM_HD std::uint32_t layer_of(std::uint32_t body) const { return is_moved(body) ? layer[body] : 0; }
+  TANDEM_HD std::uint32_t layer_of(std::uint32_t body) const {
+    return is_moved(body) ? look_at(layer[body]) : 0;
+  }
 };
 
 namespace newton_islands_detail {

@@ -37,9 +37,9 @@ struct OwnBodies {
 struct NewtonShared {
   ContactIsland island;
   NewtonScratch scratch;
-  OwnBodies bodies;   // of a step in parts, as `part`
+  OwnBodies bodies;  // of a step in parts, as `part`
   PartContacts part;
-  StepNumbers step;   // of the island, or of a part
+  StepNumbers step;  // of the island, or of a part
   const ContactPoint* contacts;
   const ContactImpulse* impulses;
   std::uint32_t first_unit;
@@ -108,7 +108,8 @@ class NewtonIslandStep {
         island.pairs[k].begin = begin, island.pairs[k].end = begin + plan_.pair(k).count;
     }
     team_.each(island.pair_count(), [&](std::uint32_t k) {
-      island.pairs[k].a = plan_.place_of(plan_.pair(k).a), island.pairs[k].b = plan_.place_of(plan_.pair(k).b);
+      island.pairs[k].a = plan_.place_of(plan_.pair(k).a),
+      island.pairs[k].b = plan_.place_of(plan_.pair(k).b);
     });
     team_.barrier();
     plan_.write_columns(with_.scratch.convex.matrix);
@@ -139,7 +140,8 @@ class NewtonIslandStep {
       with_.contacts = view_.input.contacts, with_.impulses = view_.input.start_impulses;
     }
     team_.each(bodies(), [&](std::uint32_t k) { island.bodies[k + 1] = plan_.body(k); });
-    for_contacts([&](std::uint32_t, std::uint32_t i, std::uint32_t contact) { island.contacts[i] = contact; });
+    for_contacts(
+        [&](std::uint32_t, std::uint32_t i, std::uint32_t contact) { island.contacts[i] = contact; });
     team_.barrier();
   }
 
@@ -230,7 +232,8 @@ class NewtonIslandStep {
   TANDEM_HD void for_contacts(const Visit& visit) const {
     team_.each(with_.island.pair_count(), [&](std::uint32_t k) {
       const TouchingPair& pair = with_.island.pairs[k];
-      for (std::uint32_t i = pair.begin; i < pair.end; ++i) visit(k, i, plan_.pair(k).first + (i - pair.begin));
+      for (std::uint32_t i = pair.begin; i < pair.end; ++i)
+        visit(k, i, plan_.pair(k).first + (i - pair.begin));
     });
   }
 

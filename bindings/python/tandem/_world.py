@@ -181,7 +181,7 @@ class World:
         threads: that a call may use, 1 to 1,024, the caller's thread included. Results do not depend on it. Not looked at on a GPU.
         device: "cpu", or "cuda" or "cuda:1", the GPU on which the bodies move.
 
-    On a GPU bodies move by the same rules, but all contacts are soft, and there are no joints, no continuous motion, no states to save, and no changes of
+    On a GPU bodies move by the same rules, but large groups of bodies always have soft contacts, and there are no joints, no continuous motion, no states to save, and no changes of
     materials: what is missing raises NotImplementedError. Results are arrays in CPU memory, as on the CPU, and `states` lies in GPU memory. The same calls give
     the same bytes on GPUs of one kind, but not those of the CPU.
 

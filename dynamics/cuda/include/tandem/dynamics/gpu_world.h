@@ -17,11 +17,11 @@ struct GpuBodyState {
   double velocity[3], angular_velocity[3];
 };
 
-/// Rigid bodies of meshes that move on a GPU: those of World, by the same rules, but that all contacts are
-/// soft and there are no joints and no continuous motion. Contacts are found, solved and remembered in GPU
-/// memory; the CPU reads a few numbers once a step. Throws nothing. Movable, not copyable. One call at a
-/// time, and all with the GPU that was the current one at set_assets(). The same calls give the same bytes on
-/// GPUs of one kind; docs/dynamics.md says how they differ from World's.
+/// Rigid bodies of meshes that move on a GPU: those of World, by the same rules, but that there are no joints
+/// and no continuous motion, and large groups of bodies always have soft contacts. Contacts are found, solved
+/// and remembered in GPU memory; the CPU reads a few numbers once a step. Throws nothing. Movable, not
+/// copyable. One call at a time, and all with the GPU that was the current one at set_assets(). The same
+/// calls give the same bytes on GPUs of one kind; docs/dynamics.md says how they differ from World's.
 ///
 /// All functions may also return kNoGpu, kDriverTooOld, kGpuNotSupported, kOutOfGpuMemory or kCudaFailed.
 class GpuWorld {

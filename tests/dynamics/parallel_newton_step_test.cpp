@@ -1,9 +1,7 @@
 #include <gtest/gtest.h>
 
-#include <cstring>
-
 #include "dynamics/parallel/newton_step.h"
-#include "dynamics/random_heap.h"
+#include "dynamics/same_heap_results.h"
 #include "dynamics/team_executor.h"
 
 namespace tandem::dynamics {
@@ -57,19 +55,6 @@ class BothSteps {
 };
 
 constexpr std::uint32_t kMuch = 1 << 16;
-
-template <typename Thing>
-void expect_same(const std::vector<Thing>& is, const std::vector<Thing>& wanted, const char* what) {
-  ASSERT_EQ(is.size(), wanted.size());
-  for (std::size_t i = 0; i < is.size(); ++i)
-    ASSERT_EQ(std::memcmp(&is[i], &wanted[i], sizeof(Thing)), 0) << what << " " << i;
-}
-
-void expect_same(const HeapResult& is, const HeapResult& wanted) {
-  expect_same(is.states, wanted.states, "states");
-  expect_same(is.impulses, wanted.impulses, "impulses");
-  expect_same(is.done, wanted.done, "done");
-}
 
 TEST(ParallelNewtonStep, GivesTheBytesOfTheCpusSolver) {
   for (const SolverKind kind : {SolverKind::automatic, SolverKind::newton}) {

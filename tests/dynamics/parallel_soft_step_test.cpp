@@ -1,9 +1,7 @@
 #include <gtest/gtest.h>
 
-#include <cstring>
-
 #include "dynamics/parallel/host_executor.h"
-#include "dynamics/random_heap.h"
+#include "dynamics/same_heap_results.h"
 
 namespace tandem::dynamics {
 namespace {
@@ -50,19 +48,6 @@ HeapResult parallel_solution(const RandomHeap& heap, std::uint32_t thread_count)
   }
   EXPECT_EQ(step.needs()->has_room, 1u);
   return out;
-}
-
-template <typename Thing>
-void expect_same(const std::vector<Thing>& is, const std::vector<Thing>& wanted, const char* what) {
-  ASSERT_EQ(is.size(), wanted.size());
-  for (std::size_t i = 0; i < is.size(); ++i)
-    ASSERT_EQ(std::memcmp(&is[i], &wanted[i], sizeof(Thing)), 0) << what << " " << i;
-}
-
-void expect_same(const HeapResult& is, const HeapResult& wanted) {
-  expect_same(is.states, wanted.states, "states");
-  expect_same(is.impulses, wanted.impulses, "impulses");
-  expect_same(is.done, wanted.done, "done");
 }
 
 void expect_same_as_soft_solver(const HeapOptions& options) {

@@ -2,6 +2,7 @@
 #include "dynamics/cuda/parallel_newton_step.cuh"
 #include "dynamics/cuda/parallel_soft_step.cuh"
 #include "dynamics/random_heap.h"
+#include "tandem/formats/gpu_stream.h"
 
 namespace tandem::dynamics {
 
@@ -61,6 +62,14 @@ class GpuHeap {
       if (status != Status::kOk) return status;
     }
   }
+  /// Captures the step in a graph, and makes it as often as that. Condition: there is room; it has a stream.
+  cudaError_t make_steps_in_graph(int steps) {
+    GpuGraph graph;
+    cudaError_t error = graph.capture(executor_.stream(), [&] { queue(); });
+    for (int i = 0; i < steps && error == cudaSuccess; ++i) error = graph.launch(executor_.stream());
+    return error == cudaSuccess ? cudaStreamSynchronize(executor_.stream()) : error;
+  }
+
   /// Returns what Newton's method did in the last step that was made.
   const NewtonNeeds& newton_needs() const { return newton_needs_; }
 

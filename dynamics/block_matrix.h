@@ -2,50 +2,91 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <span>
 #include <vector>
 
-#include "dynamics/island_problem.h"
+#include "dynamics/carver.h"
+#include "dynamics/linear.h"
+#include "dynamics/team.h"
 
 namespace tandem::dynamics {
 
 /// A block of a matrix: of the six velocities of one body by those of another.
 struct Matrix6 {
   double at[6][6];
+};
 
-  static Matrix6 identity() {
-    Matrix6 out = {};
-    for (int i = 0; i < 6; ++i) out.at[i][i] = 1;
-    return out;
+/// Return the six numbers of a body's velocities as an array.
+TANDEM_HD inline const double* numbers_of(const Vector6& v) {
+  static_assert(sizeof(Vector6) == 6 * sizeof(double));
+  return reinterpret_cast<const double*>(&v);
+}
+TANDEM_HD inline double* numbers_of(Vector6& v) {
+  return reinterpret_cast<double*>(&v);
+}
+
+/// So many parts a team makes of a block: each thread of many has a row.
+template <typename Team>
+inline constexpr std::uint32_t kPartsOfBlock = Team::kIsMany ? 6 : 1;
+
+/// The rows of a block that a thread of a team sums up.
+template <typename Team>
+struct BlockPart {
+  static constexpr std::uint32_t kRows = 6 / kPartsOfBlock<Team>;
+
+  std::uint32_t first;  // row
+  double at[kRows][6];
+
+  TANDEM_HD explicit BlockPart(std::uint32_t part) : first(part * kRows), at{} {}
+
+  /// Adds these rows of the identity.
+  TANDEM_HD void add_identity() {
+    for (std::uint32_t i = 0; i < kRows; ++i) {
+      for (std::uint32_t j = 0; j < 6; ++j) at[i][j] += first + i == j ? 1 : 0;
+    }
+  }
+  /// Adds weight left right^T.
+  TANDEM_HD void add(double weight, const Vector6& left, const Vector6& right) {
+    const double* const q = numbers_of(right);
+    for (std::uint32_t i = 0; i < kRows; ++i) {
+      const double by = weight * numbers_of(left)[first + i];
+      for (int j = 0; j < 6; ++j) at[i][j] += by * q[j];
+    }
+  }
+  TANDEM_HD void write(Matrix6& to) const {
+    for (std::uint32_t i = 0; i < kRows; ++i) {
+      for (int j = 0; j < 6; ++j) to.at[first + i][j] = at[i][j];
+    }
   }
 };
 
-struct Array6 {
-  double at[6];
+/// Calls visit(k) for each row k of a part of a block.
+template <typename Team, typename Visit>
+TANDEM_HD void for_rows_of_part(std::uint32_t part, const Visit& visit) {
+  constexpr std::uint32_t kRows = BlockPart<Team>::kRows;
+  for (std::uint32_t k = 0; k < kRows; ++k) visit(part * kRows + k);
+}
 
-  explicit Array6(const Vector6& v)
-      : at{v.linear.x, v.linear.y, v.linear.z, v.angular.x, v.angular.y, v.angular.z} {}
-  Vector6 vector() const { return {{at[0], at[1], at[2]}, {at[3], at[4], at[5]}}; }
-};
-
-/// m += left right^T
-inline void add_product(Matrix6& m, const Vector6& left, const Vector6& right) {
-  const Array6 p(left), q(right);
+/// m += weight left right^T
+TANDEM_HD inline void add_product(Matrix6& m, double weight, const Vector6& left, const Vector6& right) {
+  const double *const p = numbers_of(left), *const q = numbers_of(right);
   for (int i = 0; i < 6; ++i) {
-    for (int j = 0; j < 6; ++j) m.at[i][j] += p.at[i] * q.at[j];
+    for (int j = 0; j < 6; ++j) m.at[i][j] += weight * p[i] * q[j];
   }
 }
 
-/// m -= p q^T
-inline void subtract_product(Matrix6& m, const Matrix6& p, const Matrix6& q) {
-  for (int i = 0; i < 6; ++i) {
-    for (int k = 0; k < 6; ++k) {
-      for (int j = 0; j < 6; ++j) m.at[i][j] -= p.at[i][k] * q.at[j][k];
-    }
+/// m -= p q^T, in one of its rows.
+TANDEM_HD inline void subtract_product(Matrix6& m, std::uint32_t row, const Matrix6& p, const Matrix6& q) {
+  double own[6];
+  for (int j = 0; j < 6; ++j) own[j] = m.at[row][j];
+  for (int k = 0; k < 6; ++k) {
+    for (int j = 0; j < 6; ++j) own[j] -= p.at[row][k] * q.at[j][k];
   }
+  for (int j = 0; j < 6; ++j) m.at[row][j] = own[j];
 }
 
 /// m becomes its lower triangle L with L L^T = m. False: it is not positive definite, to rounding.
-inline bool factorise_block(Matrix6& m) {
+TANDEM_HD inline bool factorise_block(Matrix6& m) {
   for (int j = 0; j < 6; ++j) {
     double rest = m.at[j][j];
     for (int k = 0; k < j; ++k) rest -= m.at[j][k] * m.at[j][k];
@@ -60,115 +101,155 @@ inline bool factorise_block(Matrix6& m) {
   return true;
 }
 
-/// m becomes m L^-T.
-inline void divide_by_transposed(Matrix6& m, const Matrix6& lower) {
-  for (auto& row : m.at) {
-    for (int j = 0; j < 6; ++j) {
-      for (int k = 0; k < j; ++k) row[j] -= row[k] * lower.at[j][k];
-      row[j] /= lower.at[j][j];
-    }
+/// A row x becomes x L^-T, so as a column it becomes L^-1 x.
+TANDEM_HD inline void divide_by_transposed(double* x, const Matrix6& lower) {
+  double own[6];
+  for (int j = 0; j < 6; ++j) {
+    own[j] = x[j];
+    for (int k = 0; k < j; ++k) own[j] -= own[k] * lower.at[j][k];
+    own[j] /= lower.at[j][j];
   }
+  for (int j = 0; j < 6; ++j) x[j] = own[j];
 }
 
 /// A sparse symmetric matrix of 6 x 6 blocks: one for each body of an island and one for each two that touch
 /// or are joined, and its Cholesky factors. Bodies are eliminated in their order (make_island_problem()): by
-/// ascending layer, so that the matrix is a band, or in one that elimination_order() has found.
-class BlockMatrix {
- public:
-  explicit BlockMatrix(const IslandProblem& problem)
-      : rows_(problem.bodies.size() - 1), block_(rows_.size()), diagonal_(rows_.size()) {
-    const auto join = [&](std::uint32_t a, std::uint32_t b) {
-      if (a > 0 && b > 0) rows_[std::min(a, b) - 1].push_back(std::max(a, b) - 1);
-    };
-    for (std::size_t i = 0; i < problem.contact_count(); ++i) join(problem.a[i], problem.b[i]);
-    for (const JointRow& row : problem.joint_rows) join(row.a, row.b);
-    // Eliminating a body joins all that it touches further on.
-    for (auto& rows : rows_) {
-      std::sort(rows.begin(), rows.end());
-      rows.erase(std::unique(rows.begin(), rows.end()), rows.end());
-      if (!rows.empty()) rows_[rows[0]].insert(rows_[rows[0]].end(), rows.begin() + 1, rows.end());
+/// ascending layer, so that the matrix is a band, or in one that elimination_order() has found. Bodies are
+/// counted from 0 here.
+struct BlockMatrix {
+  // Of each body: the bodies further on that its column has, ascending, those that elimination joins to it
+  // included. Those of body j are rows[begin[j]] ... rows[begin[j + 1]).
+  std::span<std::uint32_t> begin, rows;
+  std::span<Matrix6> diagonal;
+  std::span<Matrix6> blocks;  // of each of the rows
+
+  TANDEM_HD void carve(Carver& carver, std::size_t body_count, std::size_t block_count) {
+    carver.take(body_count + 1, begin), carver.take(block_count, rows);
+    carver.take(body_count, diagonal), carver.take(block_count, blocks);
+  }
+
+  TANDEM_HD std::uint32_t body_count() const { return static_cast<std::uint32_t>(diagonal.size()); }
+
+  /// Returns which block two bodies have. Condition: low < high, and the column of `low` has `high`.
+  TANDEM_HD std::uint32_t block_of(std::uint32_t low, std::uint32_t high) const {
+    // In a column without gaps this is the place; else it is too far on.
+    std::uint32_t first = begin[low], count = begin[low + 1] - first;
+    const std::uint32_t guess = first + std::min(high - low, count) - 1;
+    if (rows[guess] == high) return guess;
+    count = guess - first;
+    while (count > 0) {
+      const std::uint32_t half = count / 2;
+      if (rows[first + half] < high)
+        first += half + 1, count -= half + 1;
+      else
+        count = half;
     }
-    for (std::size_t j = 0; j < rows_.size(); ++j) block_[j].resize(rows_[j].size());
+    return first;
+  }
+  TANDEM_HD Matrix6& beside(std::uint32_t low, std::uint32_t high) const {
+    return blocks[block_of(low, high)];
   }
 
-  void set_identity() {
-    std::fill(diagonal_.begin(), diagonal_.end(), Matrix6::identity());
-    for (auto& blocks : block_) std::fill(blocks.begin(), blocks.end(), Matrix6{});
+  /// Solves for x, one for each body: the right side, then the solution. The factors take the place of the
+  /// matrix. Result: false if it is not positive definite, to rounding.
+  template <typename Team>
+  TANDEM_HD bool solve(const Team& team, std::span<Vector6> x) const {
+    if (!factorise(team, x)) return false;
+    for (std::uint32_t j = body_count(); j-- > 0;) {
+      if (team.rank() == 0) substitute_back(x, j);
+    }
+    team.barrier();
+    return true;
   }
 
-  // Adds left^T * weight * right, two rows of the bodies a and b.
-  void add(std::uint32_t a, std::uint32_t b, const ContactRow& left, const ContactRow& right, double weight) {
-    if (a > 0) add_product(diagonal_[a - 1], weight * left.a, right.a);
-    if (b > 0) add_product(diagonal_[b - 1], weight * left.b, right.b);
-    if (a == 0 || b == 0) return;
-    if (a < b)
-      add_product(beside(a - 1, b - 1), weight * left.b, right.a);
-    else
-      add_product(beside(b - 1, a - 1), weight * left.a, right.b);
-  }
-
-  // The factors take the place of the matrix. Result: false if it is not positive definite, to rounding.
-  bool factorise() {
-    for (std::uint32_t j = 0; j < rows_.size(); ++j) {
-      if (!factorise_block(diagonal_[j])) return false;
-      for (Matrix6& block : block_[j]) divide_by_transposed(block, diagonal_[j]);
-      for (std::size_t q = 0; q < rows_[j].size(); ++q) {
-        const std::uint32_t column = rows_[j][q];
-        subtract_product(diagonal_[column], block_[j][q], block_[j][q]);
-        auto row = rows_[column].begin();
-        for (std::size_t p = q + 1; p < rows_[j].size(); ++p) {
-          row = std::lower_bound(row, rows_[column].end(), rows_[j][p]);
-          subtract_product(block_[column][static_cast<std::size_t>(row - rows_[column].begin())],
-                           block_[j][p], block_[j][q]);
-        }
-      }
+ private:
+  // The right side goes along as one more row.
+  template <typename Team>
+  TANDEM_HD bool factorise(const Team& team, std::span<Vector6> x) const {
+    constexpr std::uint32_t kParts = kPartsOfBlock<Team>;
+    for (std::uint32_t j = 0; j < body_count(); ++j) {
+      // Factors have a diagonal that is more than 0, so 0 says that there are none.
+      Matrix6& own = diagonal[j];
+      if (team.rank() == 0 && !factorise_block(own)) own.at[0][0] = 0;
+      team.barrier();
+      if (!(own.at[0][0] > 0)) return false;
+      const std::uint32_t first = begin[j], count = begin[j + 1] - first;
+      team.each(count * kParts + 1, [&](std::uint32_t i) {
+        if (i == count * kParts) return divide_by_transposed(numbers_of(x[j]), own);
+        for_rows_of_part<Team>(i % kParts, [&](std::uint32_t row) {
+          divide_by_transposed(blocks[first + i / kParts].at[row], own);
+        });
+      });
+      team.barrier();
+      each_of_triangle(team, count, kParts, [&](std::uint32_t high, std::uint32_t low, std::uint32_t part) {
+        const std::uint32_t column = rows[first + low];
+        Matrix6& to = low == high ? diagonal[column] : beside(column, rows[first + high]);
+        for_rows_of_part<Team>(part, [&](std::uint32_t row) {
+          subtract_product(to, row, blocks[first + high], blocks[first + low]);
+        });
+      });
+      team.each(count * kParts, [&](std::uint32_t i) {
+        double* const other = numbers_of(x[rows[first + i / kParts]]);
+        const double* const by = numbers_of(x[j]);
+        for_rows_of_part<Team>(i % kParts, [&](std::uint32_t row) {
+          double own_of_other = other[row];
+          for (int k = 0; k < 6; ++k) own_of_other -= blocks[first + i / kParts].at[row][k] * by[k];
+          other[row] = own_of_other;
+        });
+      });
+      team.barrier();
     }
     return true;
   }
 
-  // x: the right side, then the solution; x[0] is nobody's. Condition: factorise() has been true.
-  void solve(std::vector<Vector6>& x) const {
-    for (std::size_t j = 0; j < rows_.size(); ++j) {
-      Array6 own(x[j + 1]);
+  TANDEM_HD void substitute_back(std::span<Vector6> x, std::uint32_t j) const {
+    double own[6];
+    for (int i = 0; i < 6; ++i) own[i] = numbers_of(x[j])[i];
+    for (std::uint32_t p = begin[j]; p < begin[j + 1]; ++p) {
+      const double* const other = numbers_of(x[rows[p]]);
       for (int i = 0; i < 6; ++i) {
-        for (int k = 0; k < i; ++k) own.at[i] -= diagonal_[j].at[i][k] * own.at[k];
-        own.at[i] /= diagonal_[j].at[i][i];
-      }
-      x[j + 1] = own.vector();
-      for (std::size_t p = 0; p < rows_[j].size(); ++p) {
-        Array6 other(x[rows_[j][p] + 1]);
-        for (int i = 0; i < 6; ++i) {
-          for (int k = 0; k < 6; ++k) other.at[i] -= block_[j][p].at[i][k] * own.at[k];
-        }
-        x[rows_[j][p] + 1] = other.vector();
+        for (int k = 0; k < 6; ++k) own[k] -= blocks[p].at[i][k] * other[i];
       }
     }
-    for (std::size_t j = rows_.size(); j-- > 0;) {
-      Array6 own(x[j + 1]);
-      for (std::size_t p = 0; p < rows_[j].size(); ++p) {
-        const Array6 other(x[rows_[j][p] + 1]);
-        for (int i = 0; i < 6; ++i) {
-          for (int k = 0; k < 6; ++k) own.at[k] -= block_[j][p].at[i][k] * other.at[i];
-        }
-      }
-      for (int i = 6; i-- > 0;) {
-        for (int k = i + 1; k < 6; ++k) own.at[i] -= diagonal_[j].at[k][i] * own.at[k];
-        own.at[i] /= diagonal_[j].at[i][i];
-      }
-      x[j + 1] = own.vector();
+    for (int i = 6; i-- > 0;) {
+      for (int k = i + 1; k < 6; ++k) own[i] -= diagonal[j].at[k][i] * own[k];
+      own[i] /= diagonal[j].at[i][i];
     }
+    for (int i = 0; i < 6; ++i) numbers_of(x[j])[i] = own[i];
+  }
+};
+
+/// The columns of a BlockMatrix.
+class BlockColumns {
+ public:
+  explicit BlockColumns(std::size_t bodies) : rows_(bodies) {}
+
+  void join(std::uint32_t a, std::uint32_t b) { rows_[std::min(a, b)].push_back(std::max(a, b)); }
+
+  /// Adds what elimination joins. Result: how many blocks there are.
+  std::size_t eliminate() {
+    std::size_t blocks = 0;
+    for (auto& rows : rows_) {
+      std::sort(rows.begin(), rows.end());
+      rows.erase(std::unique(rows.begin(), rows.end()), rows.end());
+      if (!rows.empty()) rows_[rows[0]].insert(rows_[rows[0]].end(), rows.begin() + 1, rows.end());
+      blocks += rows.size();
+    }
+    return blocks;
+  }
+
+  /// Condition: the matrix has room for these bodies and blocks.
+  void write(const BlockMatrix& to) const {
+    std::uint32_t at = 0;
+    for (std::size_t j = 0; j < rows_.size(); ++j) {
+      to.begin[j] = at;
+      for (const std::uint32_t row : rows_[j]) to.rows[at++] = row;
+    }
+    to.begin[rows_.size()] = at;
   }
 
  private:
-  Matrix6& beside(std::uint32_t low, std::uint32_t high) {
-    const auto& rows = rows_[low];
-    return block_[low]
-                 [static_cast<std::size_t>(std::lower_bound(rows.begin(), rows.end(), high) - rows.begin())];
-  }
-
-  std::vector<std::vector<std::uint32_t>> rows_;  // of each body: those further on that its column has
-  std::vector<std::vector<Matrix6>> block_;       // of each of these
-  std::vector<Matrix6> diagonal_;
+  std::vector<std::vector<std::uint32_t>> rows_;
 };
 
 }  // namespace tandem::dynamics

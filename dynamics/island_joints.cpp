@@ -8,7 +8,7 @@ namespace {
 
 JointedBody jointed_body(const IslandProblem& problem, const StepInput& input, std::uint32_t body,
                          std::uint32_t place) {
-  return {body, input.bodies.data(), problem.states.data(), place > 0 ? &problem.scale[place] : nullptr};
+  return {body, input.bodies.data(), problem.states.data(), place > 0 ? &problem.stepped[place].scale : nullptr};
 }
 
 JointGeometry geometry_at_start(const IslandProblem& problem, const StepInput& input, std::uint32_t joint) {
@@ -36,7 +36,7 @@ JointSpan::JointSpan(const IslandProblem& problem, const StepInput& input)
   for (const std::uint32_t joint : problem.joints) first_.push_back(geometry_at_start(problem, input, joint));
 }
 
-void JointSpan::end_with(const std::vector<Vector6>& velocity, const std::vector<Vector6>& displacement) {
+void JointSpan::end_with(std::span<const Vector6> velocity, std::span<const Vector6> displacement) {
   const auto state = [&](std::uint32_t body, std::uint32_t place) {
     if (place > 0) return state_at_end(problem_, input_, place, velocity[place], displacement[place]);
     JointedBody unmoved = jointed_body(problem_, input_, body, place);

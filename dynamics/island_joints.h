@@ -19,7 +19,7 @@ class JointSpan {
   bool empty() const { return problem_.joints.empty(); }
 
   /// Takes the velocities and displacements that the bodies are guessed to end with.
-  void end_with(const std::vector<Vector6>& velocity, const std::vector<Vector6>& displacement);
+  void end_with(std::span<const Vector6> velocity, std::span<const Vector6> displacement);
 
   /// Make the rows those of the mean of both ends, or of the end. Their ways stay those from the start.
   void set_middle_rows(std::span<JointRow> rows) const;

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "dynamics/island_joints.h"
+#include "dynamics/team.h"
 
 namespace tandem::dynamics {
 namespace {
@@ -17,27 +18,30 @@ class ProblemMaker {
   }
 
   // Contacts of a pair are side by side. place: of each body of the step.
-  IslandProblem make(std::vector<std::uint32_t> bodies, std::vector<std::uint32_t> contacts,
+  IslandProblem make(std::span<const std::uint32_t> bodies, std::span<const std::uint32_t> contacts,
                      std::span<const std::uint32_t> joints, std::span<std::uint32_t> place) {
-    bodies.insert(bodies.begin(), 0);
-    bodies_.resize(bodies.size());
-    make_room(bodies.size(), contacts.size());
-    for (std::uint32_t i = 1; i < bodies.size(); ++i) {
-      place[bodies[i]] = i;
-      bodies_[i] = rows_.body(bodies[i]);
-      problem_.scale[i] = bodies_[i].scale;
-      problem_.velocity[i] = bodies_[i].velocity;
-      problem_.gravity[i] = bodies_[i].gravity;
-    }
-    problem_.bodies = std::move(bodies), problem_.contacts = std::move(contacts);
+    for (std::uint32_t i = 0; i < bodies.size(); ++i) place[bodies[i]] = i + 1;
     const auto place_of = [&](std::uint32_t body) { return rows_.is_moved(body) ? place[body] : 0; };
-    const auto count = static_cast<std::uint32_t>(problem_.contact_count());
-    for (std::uint32_t begin = 0, end = 0; begin < count; begin = end) {
-      const ContactPoint& contact = contact_of(begin);
-      const ObjectPair pair = {contact.body_a, contact.body_b};
-      while (end < count && ObjectPair{contact_of(end).body_a, contact_of(end).body_b} == pair) ++end;
-      add_pair(begin, end, place_of(pair.a), place_of(pair.b));
+    std::vector<TouchingPair> pairs;
+    for (std::uint32_t begin = 0, end = 0; begin < contacts.size(); begin = end) {
+      const ObjectPair pair = pair_of(input_.contacts[contacts[begin]]);
+      while (end < contacts.size() && pair_of(input_.contacts[contacts[end]]) == pair) ++end;
+      TouchingPair& to = pairs.emplace_back();
+      to.begin = begin, to.end = end, to.a = place_of(pair.a), to.b = place_of(pair.b);
     }
+    Carver counting(nullptr);
+    problem_.carve(counting, bodies.size() + 1, contacts.size(), pairs.size());
+    problem_.memory = std::make_unique_for_overwrite<std::byte[]>(counting.bytes());
+    Carver carver(problem_.memory.get());
+    problem_.carve(carver, bodies.size() + 1, contacts.size(), pairs.size());
+    problem_.bodies[0] = 0;
+    std::ranges::copy(bodies, problem_.bodies.begin() + 1);
+    std::ranges::copy(contacts, problem_.contacts.begin());
+    std::ranges::copy(pairs, problem_.pairs.begin());
+    list_pairs_of_bodies(SerialTeam{}, problem_);
+    for (std::uint32_t i = 0; i < problem_.body_count(); ++i) fill_island_body(rows_, problem_, i);
+    for (TouchingPair& pair : problem_.pairs)
+      fill_island_pair(rows_, input_.contacts.data(), impulses_.data(), problem_, pair);
     problem_.joints.assign(joints.begin(), joints.end());
     for (const std::uint32_t joint : joints)
       add_joint_rows(problem_, input_, joint, place_of(input_.joints[joint].a),
@@ -46,55 +50,9 @@ class ProblemMaker {
   }
 
  private:
-  void make_room(std::size_t bodies, std::size_t contacts) {
-    problem_.scale.resize(bodies);
-    for (auto* list : {&problem_.velocity, &problem_.displacement, &problem_.gravity})
-      list->assign(bodies, Vector6{});
-    for (auto* list : {&problem_.a, &problem_.b}) list->resize(contacts);
-    for (auto* list : {&problem_.normal, &problem_.first, &problem_.second}) list->resize(contacts);
-    for (auto* list :
-         {&problem_.first_direction, &problem_.second_direction, &problem_.drive, &problem_.impulse})
-      list->resize(contacts);
-    for (auto* list : {&problem_.separation, &problem_.friction, &problem_.rebound}) list->resize(contacts);
-  }
-
-  const ContactPoint& contact_of(std::uint32_t i) const { return input_.contacts[problem_.contacts[i]]; }
-
-  void add_pair(std::uint32_t begin, std::uint32_t end, std::uint32_t a, std::uint32_t b) {
-    TouchingPair pair = {};
-    pair.begin = begin, pair.end = end;
-    pair.drive = rows_.turning_drive(contact_of(begin));
-    pair.rolling_resistance = rows_.material_of(contact_of(begin)).rolling_resistance;
-    pair.impulse = Vector3{};
-    pair.mobility = turning_mobility(bodies_[a], bodies_[b]);
-    for (int k = 0; k < 3; ++k) {
-      pair.turn[k] = {Vector6{}, Vector6{}};
-      if (a > 0) pair.turn[k].a.angular = -bodies_[a].scale.spread.row[k];
-      if (b > 0) pair.turn[k].b.angular = bodies_[b].scale.spread.row[k];
-    }
-    const std::span<const std::uint32_t> contacts = std::span(problem_.contacts).subspan(begin, end - begin);
-    for (const std::uint32_t contact : contacts) pair.impulse += impulses_[contact].turning;
-    const Material material = rows_.material_of(input_.contacts[contacts[0]]);
-    rows_.visit_contacts(
-        contacts, [&](std::size_t k, const ContactPoint& contact, const ContactPatch& patch) {
-          const std::size_t i = begin + k;
-          const ContactRows rows =
-              rows_.rows(contact, patch, bodies_[a], bodies_[b], material, impulses_[contacts[k]]);
-          problem_.a[i] = a, problem_.b[i] = b;
-          problem_.normal[i] = rows.normal, problem_.first[i] = rows.first, problem_.second[i] = rows.second;
-          problem_.first_direction[i] = rows.first_direction,
-          problem_.second_direction[i] = rows.second_direction;
-          problem_.drive[i] = rows.drive, problem_.impulse[i] = rows.impulse;
-          problem_.separation[i] = rows.separation, problem_.rebound[i] = rows.rebound;
-          problem_.friction[i] = rows.friction;
-        });
-    problem_.pairs.push_back(pair);
-  }
-
   const StepInput& input_;
   std::span<const ContactImpulse> impulses_;
   RowMaker rows_;
-  std::vector<SteppedBody> bodies_;
   IslandProblem problem_;
 };
 
@@ -121,14 +79,14 @@ IslandProblem make_island_problem(const StepInput& input, std::size_t island, co
   return ProblemMaker(input, start, options).make(bodies, contacts, input.islands.joints_of(island), place);
 }
 
-Residual residual_of(const IslandProblem& problem, std::size_t i, double target, double share) {
+Residual residual_of(const ContactIsland& island, std::size_t i, double target) {
   Residual out;
-  const ContactRow* rows[] = {&problem.normal[i], &problem.first[i], &problem.second[i]};
-  const Vector3 impulse = share * problem.impulse[i];
-  const double bound = problem.friction[i] * impulse.x;
+  const ContactRow* rows[] = {&island.normal[i], &island.first[i], &island.second[i]};
+  const Vector3 impulse = island.impulse[i];
+  const double bound = island.friction[i] * impulse.x;
   for (int k = 0; k < 3; ++k) {
     const double mobility = rows[k]->mobility();
-    const double w = problem.along(*rows[k], i, problem.velocity) + at(problem.drive[i], k);
+    const double w = island.along(*rows[k], i, island.velocity) + at(island.drive[i], k);
     const double own = at(impulse, k), other = k == 0 ? 0 : at(impulse, 3 - k);
     const double wanted = own - (w - (k == 0 ? target : 0)) / mobility;
     // A row of friction has what the other leaves of the cone.
@@ -143,22 +101,18 @@ BodyState state_at_end(const IslandProblem& problem, const StepInput& input, std
                        const Vector6& velocity, const Vector6& displacement) {
   const std::uint32_t body = problem.bodies[place];
   BodyState state = problem.states[body];
-  apply_motion(input.bodies[body], problem.scale[place], velocity, displacement, input.dt, state);
+  apply_motion(input.bodies[body], problem.stepped[place].scale, velocity, displacement, input.dt, state);
   return state;
 }
 
 void apply_solution(const IslandProblem& problem, const StepInput& input, std::span<BodyState> states,
                     std::span<ContactImpulse> impulses) {
-  for (std::size_t i = 1; i < problem.bodies.size(); ++i)
-    states[problem.bodies[i]] = state_at_end(problem, input, i, problem.velocity[i], problem.displacement[i]);
-  for (const TouchingPair& pair : problem.pairs) {
-    for (std::uint32_t i = pair.begin; i < pair.end; ++i) {
-      const Vector3& impulse = problem.impulse[i];
-      impulses[problem.contacts[i]] = {
-          impulse.x, impulse.y * problem.first_direction[i] + impulse.z * problem.second_direction[i],
-          pair.impulse / (pair.end - pair.begin)};
-    }
+  for (std::uint32_t i = 1; i < problem.body_count(); ++i) {
+    BodyState& state = states[problem.bodies[i]];
+    state = problem.states[problem.bodies[i]];
+    move_island_body(problem, input, i, state);
   }
+  for (const TouchingPair& pair : problem.pairs) write_island_pair(problem, pair, impulses.data());
   for (const JointRow& row : problem.joint_rows)
     input.joint_memory[row.joint].impulse[row.slot] = row.impulse;
 }

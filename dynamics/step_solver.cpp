@@ -6,26 +6,23 @@
 #include "dynamics/elimination_order.h"
 #include "dynamics/island_problem.h"
 #include "dynamics/newton_parts.h"
+#include "dynamics/slender.h"
 #include "dynamics/soft_step.h"
 
 namespace tandem::dynamics {
 namespace {
 
-// Returns whether factorising the island's matrix costs no more than what Newton's method has to do for each
-// contact: with bodies by layer the matrix is a band, and eliminating w bodies that hang together with as
-// many of the next layer takes about (6 w)^3 multiplications.
-constexpr double kForAContact = 3000;
-bool is_slender(const Islands& islands, std::size_t island, std::span<const std::uint32_t> layers) {
+bool is_slender_island(const Islands& islands, std::size_t island, std::span<const std::uint32_t> layers) {
   std::vector<std::uint32_t> layer;
   for (const std::uint32_t body : islands.bodies_of(island)) layer.push_back(layers[body]);
   std::sort(layer.begin(), layer.end());
   double work = 0;
   for (auto begin = layer.begin(); begin != layer.end();) {
     const auto end = std::upper_bound(begin, layer.end(), *begin);
-    work += std::pow(6 * static_cast<double>(end - begin), 3);
+    work += elimination_work(static_cast<std::uint32_t>(end - begin));
     begin = end;
   }
-  return work <= kForAContact * static_cast<double>(islands.contacts_of(island).size());
+  return is_slender(work, islands.contacts_of(island).size());
 }
 
 // An order that eliminates the bodies of an island with joints. Layers say little of these: a robot that no
@@ -111,19 +108,14 @@ class IslandSolver final : public StepSolver {
     std::vector<std::uint32_t> order;  // of bodies; empty: by layer
   };
 
-  // Bodies that spin fast about the normal of a contact, as tops do, have a step in parts, in which their
-  // contacts turn with them. Joints find their parts by themselves.
+  // Joints find their parts by themselves.
   static std::uint32_t parts_of(const StepInput& input, std::size_t island,
                                 std::span<const BodyState> states) {
-    constexpr double kTurn = 0.1, kMostParts = 16;  // radians in a part
     if (!input.islands.joints_of(island).empty()) return 1;
     double turn = 0;
-    for (const std::uint32_t i : input.islands.contacts_of(island)) {
-      const ContactPoint& contact = input.contacts[i];
-      const Vector3 spin = states[contact.body_b].angular_velocity - states[contact.body_a].angular_velocity;
-      turn = std::max(turn, input.dt * std::fabs(dot(contact.normal, spin)));
-    }
-    return static_cast<std::uint32_t>(std::min(std::floor(turn / kTurn) + 1, kMostParts));
+    for (const std::uint32_t i : input.islands.contacts_of(island))
+      turn = std::max(turn, turn_about(input.contacts[i], states, input.dt));
+    return parts_for(turn);
   }
 
   // A step in which joints turn far takes as many parts as that asks for.
@@ -148,7 +140,7 @@ class IslandSolver final : public StepSolver {
     const bool chooses = options_.kind == SolverKind::automatic;
     if (options_.kind == SolverKind::soft) return {false, {}};
     const auto joints = static_cast<double>(input.islands.joints_of(island).size());
-    if (joints == 0) return {!chooses || is_slender(input.islands, island, layers), {}};
+    if (joints == 0) return {!chooses || is_slender_island(input.islands, island, layers), {}};
     const double contacts = static_cast<double>(input.islands.contacts_of(island).size());
     const double most = kForAContact * (contacts + kContactsOfJoint * joints);
     auto order = order_of_joined(input, island, chooses ? most : INFINITY, place_);

@@ -11,6 +11,7 @@
 #include <span>
 #include <vector>
 
+#include "dynamics/cuda/block_team.cuh"
 #include "dynamics/parallel/worker.h"
 #include "kernels/common/cub_code.cuh"
 #include "tandem/formats/gpu_memory.h"
@@ -53,6 +54,20 @@ template <typename Visit>
 __global__ void __launch_bounds__(128) visit_together(const __grid_constant__ Visit visit) {
   // The first teams are in different blocks, so that few teams have a processor each.
   visit(Worker{threadIdx.x / 32 * gridDim.x + blockIdx.x, blockDim.x / 32 * gridDim.x, threadIdx.x % 32, 32});
+}
+
+/// A block is a team. Shared: has nothing to be constructed or destroyed.
+template <typename Shared, typename Visit>
+__global__ void __launch_bounds__(BlockTeam::kSize)
+    visit_by_teams(const __grid_constant__ Visit visit, const std::uint32_t* count, std::uint32_t most) {
+  __shared__ BlockTeam::Shared of_team;
+  alignas(16) __shared__ unsigned char bytes[sizeof(Shared)];
+  const BlockTeam team(of_team);
+  const std::uint32_t below = *count < most ? *count : most;
+  for (std::uint32_t i = blockIdx.x; i < below; i += gridDim.x) {
+    visit(team, i, *reinterpret_cast<Shared*>(bytes));
+    __syncthreads();
+  }
 }
 
 /// Returns the values of an array, and 0 behind the last of them.
@@ -175,23 +190,27 @@ class CudaExecutor {
   template <typename Visit>
   void together(std::uint32_t most_teams, const Visit& visit) {
     constexpr int kThreads = 128;
-    if (most_teams == 0 || error_ != cudaSuccess) return;
-    int device = 0, processors = 0, blocks_of_processor = 0;
-    take(cudaGetDevice(&device));
-    take(cudaDeviceGetAttribute(&processors, cudaDevAttrMultiProcessorCount, device));
-    take(cudaOccupancyMaxActiveBlocksPerMultiprocessor(&blocks_of_processor, visit_together<Visit>, kThreads,
-                                                       0));
-    if (error_ != cudaSuccess) return;
+    const std::uint32_t blocks = std::min(most_teams, blocks_at_once(visit_together<Visit>, kThreads));
+    if (blocks == 0) return;
     // A cooperative launch fails unless all blocks fit at once.
     cudaLaunchAttribute cooperative = {};
     cooperative.id = cudaLaunchAttributeCooperative;
     cooperative.val.cooperative = 1;
     cudaLaunchConfig_t launch = {};
-    launch.gridDim = dim3(std::min(most_teams, static_cast<std::uint32_t>(processors * blocks_of_processor)));
+    launch.gridDim = dim3(blocks);
     launch.blockDim = dim3(kThreads);
     launch.stream = stream_;
     launch.attrs = &cooperative, launch.numAttrs = 1;
     take(cudaLaunchKernelEx(&launch, visit_together<Visit>, visit));
+  }
+
+  template <typename Shared, typename Visit>
+  void by_teams(const std::uint32_t* count, std::uint32_t most, const Visit& visit) {
+    const std::uint32_t blocks =
+        std::min(most, blocks_at_once(visit_by_teams<Shared, Visit>, BlockTeam::kSize));
+    if (blocks == 0) return;
+    visit_by_teams<Shared><<<blocks, BlockTeam::kSize, 0, stream_>>>(visit, count, most);
+    take(cudaGetLastError());
   }
 
   template <typename Visit>
@@ -280,6 +299,19 @@ class CudaExecutor {
     const auto in = thrust::make_transform_iterator(thrust::counting_iterator<std::uint32_t>(0),
                                                     ValueOrZero{values, count, most});
     return cub::DeviceScan::ExclusiveSum(scratch, bytes, in, sums, most + 1, stream_);
+  }
+
+  // Returns how many blocks of a kernel the GPU runs at once; 0 after an error.
+  template <typename Kernel>
+  std::uint32_t blocks_at_once(const Kernel& kernel, std::uint32_t threads) {
+    int device = 0, processors = 0, of_processor = 0;
+    if (error_ == cudaSuccess) take(cudaGetDevice(&device));
+    if (error_ == cudaSuccess)
+      take(cudaDeviceGetAttribute(&processors, cudaDevAttrMultiProcessorCount, device));
+    if (error_ == cudaSuccess)
+      take(
+          cudaOccupancyMaxActiveBlocksPerMultiprocessor(&of_processor, kernel, static_cast<int>(threads), 0));
+    return error_ == cudaSuccess ? static_cast<std::uint32_t>(processors * of_processor) : 0;
   }
 
   static constexpr std::size_t kMostValues = 8, kMostBytesOfValue = 256;

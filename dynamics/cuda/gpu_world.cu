@@ -7,6 +7,7 @@
 
 #include "dynamics/cuda/cuda_executor.cuh"
 #include "dynamics/cuda/cuda_questions.cuh"
+#include "dynamics/cuda/parallel_newton_step.cuh"
 #include "dynamics/parallel/parallel_simulation.h"
 #include "dynamics/parallel/wake_step.h"
 #include "dynamics/world_calls.h"

@@ -51,6 +51,21 @@ TANDEM_HD inline std::uint32_t atomic_add(std::uint32_t& of, std::uint32_t x) {
 #endif
 }
 
+/// Returns a number that others may be changing.
+TANDEM_HD inline std::uint32_t look_at(const std::uint32_t& from) {
+#ifdef __CUDA_ARCH__
+  return *static_cast<const volatile std::uint32_t*>(&from);
+#else
+  return std::atomic_ref<std::uint32_t>(const_cast<std::uint32_t&>(from)).load(std::memory_order_relaxed);
+#endif
+}
+
+/// Adds 1 where less than `most` is seen, so that a count becomes no less than `most` if it would without
+/// that. A count that has reached it is only looked at.
+TANDEM_HD inline void add_up_to(std::uint32_t& of, std::uint32_t most) {
+  if (look_at(of) < most) atomic_add(of, 1);
+}
+
 TANDEM_HD inline void atomic_or(std::uint32_t& of, std::uint32_t bits) {
 #ifdef __CUDA_ARCH__
   if ((*static_cast<volatile std::uint32_t*>(&of) & bits) != bits) atomicOr(&of, bits);

@@ -7,6 +7,7 @@
 
 #include "dynamics/parallel/worker.h"
 #include "dynamics/phases.h"
+#include "dynamics/team.h"
 #include "tandem/formats/status.h"
 
 namespace tandem::dynamics {
@@ -78,6 +79,16 @@ class HostExecutor {
     });
   }
 
+  /// Calls visit(team, i, shared) for each i below the count, by all threads of a team; see SerialTeam.
+  /// shared: a Shared that the team has for itself, of which nothing is known.
+  template <typename Shared, typename Visit>
+  void by_teams(const std::uint32_t* count, std::uint32_t most, const Visit& visit) {
+    threads_.for_parts(below(count, most), 1, [&](std::size_t i) {
+      Shared shared;
+      visit(SerialTeam{}, static_cast<std::uint32_t>(i), shared);
+    });
+  }
+
   /// Calls visit().
   template <typename Visit>
   void once(const Visit& visit) {
@@ -145,12 +156,13 @@ class HostExecutor {
 
   Status status() const { return Status::kOk; }
 
- private:
-  static constexpr std::size_t kAtOnce = 64;
-
+ protected:
   static std::uint32_t below(const std::uint32_t* count, std::uint32_t most) {
     return count != nullptr ? std::min(*count, most) : most;
   }
+
+ private:
+  static constexpr std::size_t kAtOnce = 64;
 
   Threads& threads_;
 };

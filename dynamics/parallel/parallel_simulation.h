@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "dynamics/parallel/newton_step.h"
 #include "dynamics/parallel/pair_step.h"
 #include "dynamics/parallel/parallel_joints.h"
 #include "dynamics/parallel/sleep_step.h"
@@ -47,7 +48,7 @@ struct ParallelBodies {
 
 struct ParallelOptions {
   Vector3 gravity = {0, 0, -9.81};
-  SolverOptions solver;  ///< soft contacts for all islands, whatever `kind` says
+  SolverOptions solver;
   SleepOptions sleep;
   ContinuousMotion* continuous = nullptr;  ///< limits fast bodies, on the CPU; null: nobody does
 };
@@ -195,7 +196,7 @@ class ParallelSimulation {
   /// Returns the bytes of the executor's memory that bodies, pairs and contacts take, but for those of
   /// questions and the executor.
   std::size_t bytes() const {
-    return bytes_of(solver_, joints_, properties_, acting_, states_[0], states_[1], states_[2], pulls_,
+    return bytes_of(solver_, newton_, joints_, properties_, acting_, states_[0], states_[1], states_[2], pulls_,
                     forces_, placed_, idle_, asset_, group_, label_, marks_, pose_, motion_, ways_,
                     ways_ahead_, quiet_, inner_radius_, boxes_, records_[0], records_[1], touches_[0],
                     touches_[1], begun_[0], begun_[1], plans_, flags_, sums_, list_, row_first_, row_end_,
@@ -234,6 +235,8 @@ class ParallelSimulation {
   std::uint32_t bodies() const { return bodies_; }
   std::uint32_t bad_body() const { return std::min(read_.bad_start, read_.bad_body); }
   const StepCounts& counts() const { return read_; }  ///< of the last step
+  /// Returns what Newton's method did in the last step. Condition: the solver is not SolverKind::soft.
+  const NewtonNeeds& newton() const { return newton_needs_; }
 
   /// The arrays of the last step, whose results are those of the step before now.
   StepArrays arrays(double dt = 0) const {
@@ -271,6 +274,8 @@ class ParallelSimulation {
  private:
   template <typename T>
   using Array = typename Executor::template Array<T>;
+
+  static constexpr std::uint32_t kNewtonUnits = (4u << 20) / NewtonNeeds::kUnit;  // to begin with
 
   // Parts of a step that are queued together.
   enum Part { kFind, kAddMissed, kSolve, kFinish, kParts };
@@ -326,15 +331,31 @@ class ParallelSimulation {
   }
 
   void solve(const StepArrays& a) {
-    solver_.step(to_,
-                 {a.acting, a.start, a.pulls, a.bodies, a.contacts, a.impulses_before, a.touching,
-                  &a.counts->touching, a.most_pairs, a.dt, a.joints},
-                 a.options, {a.end, a.impulses, a.done});
+    const SoftStepOutput output = {a.end, a.impulses, a.done};
+    SoftStepInput input = {a.acting,     a.start,
+                           a.pulls,      a.bodies,
+                           a.contacts,   a.impulses_before,
+                           a.touching,   &a.counts->touching,
+                           a.most_pairs, a.dt,
+                            a.joints};
+    if (has_newton()) input = newton_.step(to_, input, a.options, output);
+    solver_.step(to_, input, a.options, output);
+  }
+
+  bool has_newton() const { return options_.solver.kind != SolverKind::soft; }
+
+  // Makes room for the bodies and pairs of a solver.
+  Status reserve_solvers() {
+    const std::uint32_t units = std::max(newton_.units(), kNewtonUnits);
+    const Status status = has_newton() ? newton_.reserve(to_, bodies_, most_pairs_, units) : Status::kOk;
+    return status == Status::kOk ? solver_.reserve(to_, usual_room(bodies_, most_pairs_, most_remembered_))
+                                 : status;
   }
 
   void queue_reading() {
     to_.copy_later(counts_.data(), read_);
     to_.copy_later(solver_.needs(), solver_needs_);
+    if (has_newton()) to_.copy_later(newton_.needs(), newton_needs_);
     ask_.read_needs();
   }
 
@@ -362,6 +383,11 @@ class ParallelSimulation {
     if (status == Status::kOk && !grew && solver_needs_.has_room == 0) {
       grew = true;
       status = solver_.reserve(to_, larger_room(solver_.room(), solver_needs_));
+    }
+    if (status == Status::kOk && !grew && has_newton() && newton_needs_.has_room == 0) {
+      grew = true;
+      const std::uint32_t units = newton_needs_.units + newton_needs_.units / 4;
+      status = newton_.reserve(to_, bodies_, most_pairs_, units);
     }
     whole = !grew;
     if (grew) ++generation_;
@@ -473,8 +499,7 @@ class ParallelSimulation {
       if (out == Status::kOk) out = status;
     }
     most_pairs_ = out == Status::kOk ? pairs : 0;
-    return out == Status::kOk ? solver_.reserve(to_, usual_room(bodies_, most_pairs_, most_remembered_))
-                              : out;
+    return out == Status::kOk ? reserve_solvers() : out;
   }
 
   Status reserve_moved(std::uint32_t rows) {
@@ -505,13 +530,14 @@ class ParallelSimulation {
     }
     if (out != Status::kOk) return out;
     most_found_ = found, most_remembered_ = remembered;
-    return solver_.reserve(to_, usual_room(bodies_, most_pairs_, most_remembered_));
+    return reserve_solvers();
   }
 
   Executor& to_;
   Questions& ask_;
   ParallelSoftStep<Executor> solver_;
   ParallelJoints<Executor> joints_;
+  ParallelNewtonStep<Executor> newton_;
   ParallelOptions options_;
   std::uint32_t bodies_ = 0, most_pairs_ = 0, most_moved_ = 0, most_found_ = 0, most_remembered_ = 0;
   std::uint32_t records_count_ = 0, remembered_count_ = 0;  // of the last step that was whole
@@ -520,6 +546,7 @@ class ParallelSimulation {
   bool has_forces_ = false;
   StepCounts read_ = {};
   SoftStepNeeds solver_needs_ = {};
+  NewtonNeeds newton_needs_ = {};
   double dt_ = 0;
   std::uint64_t generation_ = 0;  // of all that is queued, memory included
   int parity_ = 0;                // of the step: records change places

@@ -2,7 +2,7 @@
 #include <cstdint>
 
 #include "dynamics/islands.h"
-#include "dynamics/parallel/atomics.h"
+#include "dynamics/parallel/labels.h"
 #include "dynamics/parallel/step_arrays.h"
 
 /// Islands and sleep of a parallel step: what find_islands() and Sleep do. An island is known by its first
@@ -12,23 +12,6 @@ namespace tandem::dynamics {
 namespace sleep_step_detail {
 
 enum Mark : std::uint32_t { kWoken = 1, kTouches = 2, kRestless = 4 };
-
-TANDEM_HD inline std::uint32_t first_of(const std::uint32_t* label, std::uint32_t body) {
-  while (label[body] != body) body = label[body];
-  return body;
-}
-
-// Joins the islands of two bodies. A label always leads to one that is less, whoever else joins islands
-// meanwhile.
-TANDEM_HD inline void join(std::uint32_t* label, std::uint32_t a, std::uint32_t b) {
-  a = first_of(label, a), b = first_of(label, b);
-  while (a != b) {
-    const std::uint32_t larger = a > b ? a : b, smaller = a > b ? b : a;
-    const std::uint32_t there = atomic_exchange_if(label[larger], larger, smaller);
-    if (there == larger) return;
-    a = first_of(label, there), b = smaller;
-  }
-}
 
 // The mark of a body that sleeps stands for all that fell asleep with it; those of an island for all of it.
 TANDEM_HD inline void mark(const StepArrays& a, std::uint32_t of, Mark mark) {

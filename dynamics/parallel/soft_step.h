@@ -24,7 +24,19 @@ struct SoftStepInput {
   std::uint32_t most_pairs;         ///< how many there is room for
   double dt;
   JointArrays joints = {};
+  const std::uint8_t* is_solved = nullptr;  ///< bodies that have their states at the end; null: none has
 };
+
+/// Returns the numbers that rows are made of.
+inline StepNumbers step_numbers(const SoftStepInput& input, const SolverOptions& options) {
+  StepNumbers step;
+  step.bodies = {input.bodies, input.body_count};
+  step.contacts = {input.contacts, std::size_t{1} << 32};  // more than numbers of 32 bits can name
+  step.pulls = {input.pulls, input.body_count};
+  step.states = {input.states, input.body_count};
+  step.dt = input.dt, step.options = options;
+  return step;
+}
 
 /// What a step writes. Each array may be the one of the input that it follows from.
 struct SoftStepOutput {
@@ -135,6 +147,7 @@ TANDEM_HD inline void fill_lane(const SoftStepView& view, std::uint32_t i) {
 
 TANDEM_HD inline void end_body(const SoftStepView& view, std::uint32_t i) {
   if (view.groups.needs->has_room == 0) return;
+  if (view.input.is_solved != nullptr && view.input.is_solved[i] != 0) return;
   const BodyProperties& body = view.input.bodies[i];
   BodyState state = view.input.states[i];
   if (view.is_held(i))
@@ -229,7 +242,7 @@ class ParallelSoftStep {
     if (view_->input.joints.tasks > 0)
       sweep(executor, view_->joints(), std::max(view_->input.joints.tasks, room_.groups / kGroupsOfTeam));
     else
-      sweep(executor, NoJoints{}, room_.groups / kGroupsOfTeam);
+      sweep(executor, NoJointSweeps{}, room_.groups / kGroupsOfTeam);
   }
   void write(Executor& executor) {
     using namespace soft_step_detail;
@@ -256,7 +269,7 @@ class ParallelSoftStep {
     });
   }
 
-  // Joints: NoJoints or JointSweeps.
+  // Joints: NoJointSweeps or JointSweeps.
   template <typename Joints>
   void sweep(Executor& executor, const Joints& joints, std::uint32_t most_teams) {
     const SoftSweeps sweeps = view_->sweeps;
@@ -270,13 +283,7 @@ class ParallelSoftStep {
  private:
   SoftStepView view_of(const SoftStepInput& input, const SolverOptions& options,
                        const SoftStepOutput& output) const {
-    StepNumbers step;
-    step.bodies = {input.bodies, input.body_count};
-    step.contacts = {input.contacts, std::size_t{1} << 32};  // more than numbers of 32 bits can name
-    step.pulls = {input.pulls, input.body_count};
-    step.states = {input.states, input.body_count};
-    step.dt = input.dt, step.options = options;
-    const SoftNumbers numbers(step, input.start_impulses);
+    const SoftNumbers numbers(step_numbers(input, options), input.start_impulses);
     const SoftRows rows = {
         nullptr,         nullptr,      groups_.data(),    turnings_.data(),
         normals_.data(), gaps_.data(), frictions_.data(), static_cast<float>(1 / numbers.h)};

@@ -33,7 +33,7 @@ struct SoftTurns {
 };
 
 /// Stands for JointSweeps in a step without joints.
-struct NoJoints {
+struct NoJointSweeps {
   static constexpr bool kAny = false;
 };
 
@@ -238,7 +238,7 @@ TANDEM_HD inline std::uint32_t end_of_colour(const SoftSweeps& all, std::uint32_
 /// those with a colour of their own. On its way to a meeting a worker reads rows of the next colour.
 ///
 /// kMany: on a GPU, what is for few tasks leaves many alone, and the other way round. Workers of the CPU
-/// never meet. joints: NoJoints or JointSweeps.
+/// never meet. joints: NoJointSweeps or JointSweeps.
 template <bool kMany, typename Joints>
 TANDEM_HD void sweep_all(const SoftSweeps& all, const Joints& joints, const Worker& worker) {
   constexpr std::uint32_t kLanes = kGroupsOfTeam * kSoftWidth, kMostTasksWithoutMeeting = 600;

@@ -32,7 +32,8 @@ class BothWays {
   /// of: has assets and descriptions of bodies.
   template <typename Bodies>
   explicit BothWays(const Bodies& of, const WorldOptions& options = {}, std::uint32_t threads = 1,
-                    std::span<const JointDescription> joints = {})
+                    std::span<const JointDescription> joints = {},
+                    dynamics::SolverKind kind = dynamics::SolverKind::soft)
       : threads_(threads),
         executor_(threads_),
         questions_(of.assets.views(), &filter_),
@@ -40,7 +41,7 @@ class BothWays {
     dynamics::WorldSetup setup;
     std::uint64_t where = 0;
     EXPECT_EQ(set_up(of.assets.views(), of.descriptions, options, joints, setup, where), Status::kOk);
-    setup.options.solver.kind = dynamics::SolverKind::soft;
+    setup.options.solver.kind = kind;
     keep_apart(setup.joints);
     const std::vector<double> inner = dynamics::inner_radii(of.assets.views());
     std::vector<AssetBox> boxes;

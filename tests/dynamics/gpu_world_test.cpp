@@ -22,13 +22,12 @@ bool has_gpu() {
 #define NEEDS_GPU() \
   if (!has_gpu()) GTEST_SKIP() << "no GPU"
 
-// Moves the same bodies by a GpuWorld and by a Simulation with soft contacts.
+// Moves the same bodies by a GpuWorld and by a Simulation.
 struct BothWorlds {
   explicit BothWorlds(const FallingBodies& of, const WorldOptions& options = {}) {
     WorldSetup setup;
     std::uint64_t where = 0;
     EXPECT_EQ(set_up(of.assets.views(), of.descriptions, options, {}, setup, where), Status::kOk);
-    setup.options.solver.kind = SolverKind::soft;
     SimulationParts parts;
     parts.contacts = make_scene_contacts(of.assets.views(), 1);
     parts.ahead = std::make_unique<ContactsAhead>(of.assets.views(), 1);
@@ -74,6 +73,39 @@ TEST(GpuWorlds, MoveBodiesAsASimulationDoes) {
     ASSERT_LT(worst, 1e-3) << "step " << step << " body " << at;
   }
   RecordProperty("most", std::to_string(most));
+}
+
+// Stacks boxes with gaps of 10 um. Result: how far the world moves a body sideways or down in two seconds, at
+// most.
+double drift_of_tower(int boxes, double density_of_last) {
+  FallingBodies tower(1);
+  for (int i = 0; i < boxes; ++i) {
+    BodyDescription& body = tower.descriptions.emplace_back();
+    body.asset = 3, body.pose = shift(1e-3 * (i % 3), 0, 0.1 + 0.20001 * i);
+  }
+  tower.descriptions.back().density = density_of_last;
+  GpuWorld world;
+  EXPECT_EQ(world.set_assets(tower.assets.views()), Status::kOk);
+  EXPECT_EQ(world.set_bodies(tower.descriptions, {.sleeping = false}), Status::kOk);
+  EXPECT_EQ(world.step(1.0 / 60, 120), Status::kOk);
+  std::span<const BodyMotion> motions;
+  EXPECT_EQ(world.bodies(motions), Status::kOk);
+  double most = 0;
+  for (std::size_t i = 1; i < motions.size(); ++i) {
+    const double* const at = tower.descriptions[i].pose.translation;
+    most = std::max(most, norm(vector_of(motions[i].centre) - Vector3{at[0], at[1], at[2]}));
+  }
+  return most;
+}
+
+TEST(GpuWorlds, KeepATowerOf30Boxes) {
+  NEEDS_GPU();
+  EXPECT_LT(drift_of_tower(30, 1000), 1e-3);
+}
+
+TEST(GpuWorlds, KeepHeavyOnLight) {
+  NEEDS_GPU();
+  EXPECT_LT(drift_of_tower(3, 1e7), 1e-3);
 }
 
 TEST(GpuWorlds, GiveTheSameBytesTwice) {

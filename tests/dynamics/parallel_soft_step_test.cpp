@@ -1,9 +1,7 @@
 #include <gtest/gtest.h>
 
-#include <cstring>
-
 #include "dynamics/parallel/host_executor.h"
-#include "dynamics/random_heap.h"
+#include "dynamics/same_heap_results.h"
 
 namespace tandem::dynamics {
 namespace {
@@ -52,22 +50,9 @@ HeapResult parallel_solution(const RandomHeap& heap, std::uint32_t thread_count)
   return out;
 }
 
-template <typename Thing>
-void expect_same(const std::vector<Thing>& is, const std::vector<Thing>& wanted, const char* what) {
-  ASSERT_EQ(is.size(), wanted.size());
-  for (std::size_t i = 0; i < is.size(); ++i)
-    ASSERT_EQ(std::memcmp(&is[i], &wanted[i], sizeof(Thing)), 0) << what << " " << i;
-}
-
-void expect_same(const HeapResult& is, const HeapResult& wanted) {
-  expect_same(is.states, wanted.states, "states");
-  expect_same(is.impulses, wanted.impulses, "impulses");
-  expect_same(is.done, wanted.done, "done");
-}
-
 void expect_same_as_soft_solver(const HeapOptions& options) {
   const RandomHeap heap(options);
-  const HeapResult wanted = soft_solution(heap);
+  const HeapResult wanted = solution(heap);
   EXPECT_TRUE(std::ranges::all_of(wanted.states, is_usable));
   for (const std::uint32_t threads : {1u, 3u}) {
     SCOPED_TRACE(threads);
@@ -99,7 +84,7 @@ TEST(ParallelSoftStep, FollowsTheNumberOfSubsteps) {
   for (const std::uint32_t substeps : {1u, 5u}) {
     RandomHeap heap({.bodies = 80, .pairs = 200});
     heap.options.substeps = substeps;
-    expect_same(parallel_solution(heap, 1), soft_solution(heap));
+    expect_same(parallel_solution(heap, 1), solution(heap));
   }
 }
 
@@ -127,7 +112,7 @@ TEST(ParallelSoftStep, SaysWhatItNeedsWhereThereIsTooLittleRoom) {
   ASSERT_EQ(step.reserve(executor, room), Status::kOk);
   make_step(step, executor, heap, out);
   EXPECT_EQ(step.needs()->has_room, 1u);
-  expect_same(out, soft_solution(heap));
+  expect_same(out, solution(heap));
 }
 
 TEST(ParallelSoftStep, SolvesOneStepAfterAnother) {
@@ -142,7 +127,7 @@ TEST(ParallelSoftStep, SolvesOneStepAfterAnother) {
     ASSERT_EQ(step.reserve(executor, room), Status::kOk);
     make_step(step, executor, heap, out);
     ASSERT_EQ(step.needs()->has_room, 1u);
-    expect_same(out, soft_solution(heap));
+    expect_same(out, solution(heap));
   }
 }
 

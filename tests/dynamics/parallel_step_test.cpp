@@ -229,5 +229,61 @@ TEST(ParallelStep, IsMadeAgainWhereRoomIsShort) {
   EXPECT_TRUE(same_rows<BodyState>(both.states(), states));
 }
 
+// Boxes on each other, askew, in a tower.
+void add_tower(FallingBodies& to, double x, double y, int count) {
+  for (int i = 0; i < count; ++i) {
+    BodyDescription& body = to.descriptions.emplace_back();
+    body.asset = 3, body.pose = shift(x + 1e-3 * (i % 3), y, 0.1 + 0.20001 * i);
+  }
+}
+
+TEST(ParallelStep, SolvesATowerByNewtonsMethod) {
+  FallingBodies tower(1);
+  add_tower(tower, 0, 0, 30);
+  BothWays both(tower, {.sleeping = false}, 1, {}, SolverKind::automatic);
+  for (int step = 0; step < 120 && !HasFatalFailure(); ++step) {
+    both.step(step);
+    if (step > 1) {
+      ASSERT_EQ(both.parallel.newton().solved, 1u) << step;
+    }
+  }
+  EXPECT_NEAR(both.states()[30].position.z, 0.1 + 29 * 0.20001, 1e-3);
+}
+
+TEST(ParallelStep, HeavyStandsOnLightAsInASimulation) {
+  FallingBodies tower(1);
+  add_tower(tower, 0, 0, 3);
+  tower.descriptions.back().density = 1e7;
+  BothWays both(tower, {.sleeping = false}, 1, {}, SolverKind::automatic);
+  for (int step = 0; step < 240 && !HasFatalFailure(); ++step) both.step(step);
+  EXPECT_NEAR(both.states()[3].position.z, 0.1 + 2 * 0.20001, 1e-3);
+}
+
+// A heap of soft contacts beside towers, and bodies that fall asleep.
+TEST(ParallelStep, SolvesTowersBesideAHeapAsASimulationDoes) {
+  FallingBodies bodies(40, 3);
+  add_tower(bodies, 8, 0, 10), add_tower(bodies, 10, 0, 6);
+  BothWays both(bodies, {}, 2, {}, SolverKind::automatic);
+  std::uint32_t islands = 0, solved = 0;
+  for (int step = 0; step < 240 && !HasFatalFailure(); ++step) {
+    both.step(step);
+    islands += both.parallel.newton().islands, solved += both.parallel.newton().solved;
+  }
+  EXPECT_GT(solved, 1000u);
+  EXPECT_GT(islands, solved);
+}
+
+TEST(ParallelStep, IsMadeAgainWhereNewtonsMethodHasTooLittleRoom) {
+  FallingBodies towers(1);
+  for (int i = 0; i < 150; ++i) add_tower(towers, 0.7 * (i % 10) - 3, 0.6 * (i / 10) - 4, 8);
+  BothWays both(towers, {}, 2, {}, SolverKind::automatic);
+  std::uint32_t units = 0;
+  for (int step = 0; step < 3 && !HasFatalFailure(); ++step) {
+    both.step(step);
+    units = std::max(units, both.parallel.newton().units);
+  }
+  EXPECT_GT(units, (4u << 20) / NewtonNeeds::kUnit);
+}
+
 }  // namespace
 }  // namespace tandem::test

@@ -97,14 +97,60 @@ struct RandomHeap {
   std::mt19937 random_;
 };
 
+/// Returns few pairs, so that there are many islands, small ones and large ones.
+inline RandomHeap sparse_heap(unsigned seed, SolverKind kind) {
+  RandomHeap heap({.bodies = 150, .pairs = 90 + 10 * seed, .seed = seed});
+  heap.options.kind = kind;
+  return heap;
+}
+
+/// Returns boxes on each other on a fixed one, the last of 10,000 kg and the others of 1 kg. Two that touch
+/// do so by four corners.
+inline RandomHeap tower(std::uint32_t boxes) {
+  RandomHeap out({.bodies = boxes + 1, .pairs = 0});
+  out.options = {};
+  out.bodies[0].motion = Motion::fixed;
+  for (std::uint32_t i = 1; i <= boxes; ++i) {
+    BodyProperties& body = out.bodies[i];
+    body = {}, body.mass = i == boxes ? 1e4 : 1;
+    body.inertia = body.mass / 6 * Matrix3::identity(), body.inverse_inertia = inverse(body.inertia);
+    out.states[i] = {{0, 0, i - 0.5}, {}, {0.01 * i, 0, 0}, {}};
+    out.pairs.push_back({i - 1, i, static_cast<std::uint32_t>(out.contacts.size()), 4});
+    for (int k = 0; k < 4; ++k)
+      out.contacts.push_back({i - 1,
+                              i,
+                              {k % 2 - 0.5, k / 2 - 0.5, i - 1.0},
+                              {0, 0, 1},
+                              1e-4,
+                              static_cast<std::uint64_t>(k + 1)});
+  }
+  out.states[0] = {};
+  out.pulls.assign(boxes + 1, {{0, 0, -9.81}, {}});
+  out.impulses.assign(out.contacts.size(), {});
+  return out;
+}
+
 /// What a step of a heap gives.
 struct HeapResult {
   std::vector<BodyState> states;
   std::vector<ContactImpulse> impulses, done;
 };
 
-/// A step of the heap as the CPU makes it.
-inline HeapResult soft_solution(const RandomHeap& heap, std::uint32_t thread_count = 1) {
+/// Returns by how much a velocity, a spin, a place or a turn of a body differs at most; infinity where one is
+/// no number.
+inline double largest_difference(const HeapResult& a, const HeapResult& b) {
+  double most = 0;
+  for (std::size_t i = 0; i < a.states.size(); ++i) {
+    const BodyState &p = a.states[i], &q = b.states[i];
+    for (const Vector3& by : {p.velocity - q.velocity, p.angular_velocity - q.angular_velocity,
+                              p.position - q.position, turn_between(p.orientation, q.orientation)})
+      if (!(norm(by) <= most)) most = norm(by) > most ? norm(by) : INFINITY;
+  }
+  return most;
+}
+
+/// Returns a step of the heap as the CPU makes it, by the solver of the heap's options.
+inline HeapResult solution(const RandomHeap& heap, std::uint32_t thread_count = 1) {
   Threads threads(thread_count);
   std::vector<ContactImpulse> done = heap.impulses;
   HeapResult out = {heap.states, heap.impulses, {}};

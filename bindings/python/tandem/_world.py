@@ -175,8 +175,8 @@ class World:
         threads: that a call may use, 1 to 1,024, the caller's thread included. Results do not depend on it. A GPU uses them for continuous motion alone.
         device: "cpu", or "cuda" or "cuda:1", the GPU on which the bodies move.
 
-    On a GPU bodies move by the same rules, but all contacts and joints are soft. Results
-    are arrays in CPU memory, as on the CPU, and `states` lies in GPU memory. The same calls give the same bytes on GPUs of one kind, but not those of the CPU.
+    On a GPU bodies move by the same rules, but joints and large groups of bodies are always soft. Results are arrays in CPU memory, as on the CPU, and `states`
+    lies in GPU memory. The same calls give the same bytes on GPUs of one kind, but not those of the CPU.
 
     Calls let other Python threads run. A world takes one call at a time: a second thread gets RuntimeError; several worlds may share assets.
 

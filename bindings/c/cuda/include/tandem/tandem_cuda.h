@@ -684,10 +684,9 @@ TANDEM_API size_t tandem_gpu_probe_query_bytes(const tandem_gpu_probe_query* que
 /// ---- Worlds on a GPU
 
 /// Rigid bodies that move on a GPU, by the rules of a tandem_world and from the same structs. Bodies,
-/// contacts and pairs stay in GPU memory. All contacts and joints are soft;
-/// docs/dynamics.md says what that means. The same calls give the same bytes on GPUs of one kind, but not
-/// those of a tandem_world. A world takes one call at a time, and belongs to the device that was current when
-/// it was given its assets.
+/// contacts and pairs stay in GPU memory. Joints and large groups of bodies are always soft; see
+/// docs/dynamics.md. The same calls give the same bytes on GPUs of one kind, but not those of a tandem_world.
+/// A world takes one call at a time, and belongs to the device that was current when it was given its assets.
 typedef struct tandem_gpu_world tandem_gpu_world;
 
 /// How a body stands and moves, in GPU memory: 13 numbers.

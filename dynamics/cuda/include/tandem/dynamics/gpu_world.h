@@ -17,9 +17,9 @@ struct GpuBodyState {
   double velocity[3], angular_velocity[3];
 };
 
-/// Rigid bodies of meshes that move on a GPU: those of World, by the same rules, but that all contacts and
-/// joints are soft. Contacts are found, solved and remembered in GPU memory; the CPU reads a few numbers once
-/// a step, and limits continuous motion in steps that have fast bodies. Throws nothing. Movable, not
+/// Rigid bodies of meshes that move on a GPU: those of World, by the same rules, but that joints, and large
+/// groups of bodies, are always soft. Contacts are found, solved and remembered in GPU memory; the CPU reads a
+/// few numbers once a step, and limits continuous motion in steps that have fast bodies. Throws nothing. Movable, not
 /// copyable. One call at a time, and all with the GPU that was the current one at set_assets(). The same
 /// calls give the same bytes on GPUs of one kind; docs/dynamics.md says how they differ from World's.
 ///

@@ -1,0 +1,7 @@
+#include "dynamics/cuda/parallel_newton_step.cuh"
+
+namespace tandem::dynamics {
+
+template class ParallelNewtonStep<CudaExecutor>;
+
+}  // namespace tandem::dynamics

@@ -1,0 +1,9 @@
+#pragma once
+#include "dynamics/cuda/cuda_executor.cuh"
+#include "dynamics/parallel/newton_step.h"
+
+namespace tandem::dynamics {
+
+extern template class ParallelNewtonStep<CudaExecutor>;
+
+}  // namespace tandem::dynamics

@@ -154,7 +154,12 @@ class Sweeper {
     return tasks_ > worker_.block ? ((tasks_ - worker_.block - 1) >> shift_) + 1 : 0;
   }
   TANDEM_HD TaskMemory memory(std::uint32_t k, std::uint32_t contacts) const {
-    return {worker_.own + plan_->first_byte[k], contacts};
+#if defined(__CUDA_ARCH__)
+    char* const own = static_cast<char*>(__cvta_shared_to_generic(__cvta_generic_to_shared(worker_.own)));
+#else
+    char* const own = worker_.own;
+#endif
+    return {own + plan_->first_byte[k], contacts};
   }
 
   TANDEM_HD void add_up(std::uint64_t byte) {

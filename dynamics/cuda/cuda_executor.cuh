@@ -70,6 +70,14 @@ __global__ void __launch_bounds__(BlockTeam::kSize)
   }
 }
 
+template <typename Visit>
+__global__ void __launch_bounds__(128)
+    visit_in_cluster(const __grid_constant__ Visit visit, std::uint32_t bytes) {
+  extern __shared__ __align__(128) char own_of_block[];
+  visit(ClusterWorker{blockIdx.x, gridDim.x, threadIdx.x / 32, blockDim.x / 32, threadIdx.x % 32, 32,
+                      own_of_block, bytes});
+}
+
 /// Returns the values of an array, and 0 behind the last of them.
 struct ValueOrZero {
   const std::uint32_t *values, *count;
@@ -211,6 +219,38 @@ class CudaExecutor {
     if (blocks == 0) return;
     visit_by_teams<Shared><<<blocks, BlockTeam::kSize, 0, stream_>>>(visit, count, most);
     take(cudaGetLastError());
+  }
+
+  /// See HostExecutor. There can be none on GPUs before compute capability 9.
+  template <typename Visit>
+  void in_cluster(const Visit& visit) {
+    constexpr unsigned kThreads = 128, kMostBlocks = 16;
+    if (error_ != cudaSuccess) return;
+    int device = 0, capability = 0, bytes = 0;
+    take(cudaGetDevice(&device));
+    take(cudaDeviceGetAttribute(&capability, cudaDevAttrComputeCapabilityMajor, device));
+    take(cudaDeviceGetAttribute(&bytes, cudaDevAttrMaxSharedMemoryPerBlockOptin, device));
+    if (error_ != cudaSuccess || capability < 9) return;
+    const auto kernel = visit_in_cluster<Visit>;
+    take(cudaFuncSetAttribute(kernel, cudaFuncAttributeMaxDynamicSharedMemorySize, bytes));
+    take(cudaFuncSetAttribute(kernel, cudaFuncAttributeNonPortableClusterSizeAllowed, 1));
+    cudaLaunchAttribute cluster = {};
+    cluster.id = cudaLaunchAttributeClusterDimension;
+    cudaLaunchConfig_t launch = {};
+    launch.blockDim = dim3(kThreads);
+    launch.dynamicSmemBytes = static_cast<std::size_t>(bytes);
+    launch.stream = stream_;
+    launch.attrs = &cluster, launch.numAttrs = 1;
+    // Some GPUs have no place for so many blocks side by side.
+    for (unsigned blocks = kMostBlocks; blocks > 0 && error_ == cudaSuccess; blocks /= 2) {
+      int clusters = 0;
+      cluster.val.clusterDim.x = blocks, cluster.val.clusterDim.y = cluster.val.clusterDim.z = 1;
+      launch.gridDim = dim3(blocks);
+      take(cudaOccupancyMaxActiveClusters(&clusters, kernel, &launch));
+      if (clusters == 0) continue;
+      take(cudaLaunchKernelEx(&launch, kernel, visit, static_cast<std::uint32_t>(bytes)));
+      return;
+    }
   }
 
   template <typename Visit>

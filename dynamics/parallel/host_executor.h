@@ -89,6 +89,14 @@ class HostExecutor {
     });
   }
 
+  /// Calls visit(worker) for the workers of a cluster, if there can be one. Here it is a single worker.
+  template <typename Visit>
+  void in_cluster(const Visit& visit) {
+    constexpr std::uint32_t kBytes = 1 << 20;
+    own_of_block_.resize(kBytes / sizeof(Aligned));
+    visit(ClusterWorker{0, 1, 0, 1, 0, 1, reinterpret_cast<char*>(own_of_block_.data()), kBytes});
+  }
+
   /// Calls visit().
   template <typename Visit>
   void once(const Visit& visit) {
@@ -164,7 +172,12 @@ class HostExecutor {
  private:
   static constexpr std::size_t kAtOnce = 64;
 
+  struct alignas(128) Aligned {
+    char bytes[128];
+  };
+
   Threads& threads_;
+  std::vector<Aligned> own_of_block_;
 };
 
 }  // namespace tandem::dynamics

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "dynamics/parallel/bytes_of.h"
 #include "dynamics/parallel/newton_solve.h"
 
 namespace tandem::dynamics {

@@ -4,6 +4,7 @@
 #include <optional>
 #include <span>
 
+#include "dynamics/parallel/cluster_sweeps.h"
 #include "dynamics/parallel/joint_step.h"
 #include "dynamics/parallel/pair_groups.h"
 #include "dynamics/parallel/soft_sweeps.h"
@@ -91,7 +92,7 @@ struct SoftStepView {
 namespace soft_step_detail {
 
 TANDEM_HD inline void fill_body(const SoftStepView& view, std::uint32_t i) {
-  if (i == 0) *view.bounces = 0, *view.sweeps.arrived = 0;
+  if (i == 0) *view.bounces = 0, *view.sweeps.arrived = 0, *view.sweeps.is_done = 0;
   view.sweeps.velocities[i] = {}, view.sweeps.moved[i] = {};
   if (!view.is_held(i)) return;
   view.bodies[i] = soft_body(view.numbers, view.unit_root(), i);
@@ -188,7 +189,8 @@ class ParallelSoftStep {
     take(grouping_.reserve(room_.pairs, room_.groups, room_.rows));
     take(bodies_.reserve(room_.bodies)), take(gains_.reserve(room_.bodies));
     take(starts_.reserve(room_.bodies)), take(velocities_.reserve(room_.bodies));
-    take(moved_.reserve(room_.bodies)), take(bounces_.reserve(1)), take(arrived_.reserve(1));
+    take(moved_.reserve(room_.bodies)), take(bounces_.reserve(1)), take(arrived_.reserve(1)),
+        take(is_done_.reserve(1));
     take(groups_.reserve(room_.groups)), take(turnings_.reserve(room_.groups));
     take(turns_.reserve(room_.groups)), take(normals_.reserve(room_.rows));
     take(gaps_.reserve(room_.rows)), take(frictions_.reserve(room_.rows));
@@ -197,7 +199,7 @@ class ParallelSoftStep {
   const SoftStepRoom& room() const { return room_; }
   std::size_t bytes() const {
     return bytes_of(colouring_, grouping_, bodies_, gains_, starts_, velocities_, moved_, bounces_, arrived_,
-                    groups_, turnings_, turns_, normals_, gaps_, frictions_);
+                    is_done_, groups_, turnings_, turns_, normals_, gaps_, frictions_);
   }
 
   /// What the last step needed room for, in the executor's memory. Where it had too little it has written
@@ -273,6 +275,8 @@ class ParallelSoftStep {
   template <typename Joints>
   void sweep(Executor& executor, const Joints& joints, std::uint32_t most_teams) {
     const SoftSweeps sweeps = view_->sweeps;
+    if constexpr (!Joints::kAny)
+      executor.in_cluster([=] TANDEM_HD(const ClusterWorker& worker) { sweep_in_cluster(sweeps, worker); });
     executor.together(most_teams,
                       [=] TANDEM_HD(const Worker& worker) { sweep_all<false>(sweeps, joints, worker); });
     if constexpr (Executor::kHasManyWorkers)
@@ -288,16 +292,16 @@ class ParallelSoftStep {
         nullptr,         nullptr,      groups_.data(),    turnings_.data(),
         normals_.data(), gaps_.data(), frictions_.data(), static_cast<float>(1 / numbers.h)};
     const GroupsView& groups = grouping_.view();
-    return {
-        numbers,
-        {rows, turns_.data(), velocities_.data(), moved_.data(), gains_.data(), starts_.data(), groups.groups,
-         groups.colours, groups.shared, arrived_.data(), bounces_.data(), numbers.h, options.substeps},
-        groups,
-        input,
-        output,
-        bodies_.data(),
-        turns_.data(),
-        bounces_.data()};
+    return {numbers,
+            {rows, turns_.data(), velocities_.data(), moved_.data(), gains_.data(), starts_.data(),
+             groups.groups, groups.colours, groups.shared, arrived_.data(), is_done_.data(), input.body_count,
+             bounces_.data(), numbers.h, options.substeps},
+            groups,
+            input,
+            output,
+            bodies_.data(),
+            turns_.data(),
+            bounces_.data()};
   }
 
   template <typename T>
@@ -310,7 +314,7 @@ class ParallelSoftStep {
   Array<SteppedBody> bodies_;
   Array<SoftMotion> gains_, starts_;
   Array<SharedMotion> velocities_, moved_;
-  Array<std::uint32_t> bounces_, arrived_;
+  Array<std::uint32_t> bounces_, arrived_, is_done_;
   Array<SoftPairs> groups_;
   Array<SoftTurning> turnings_;
   Array<SoftTurns> turns_;

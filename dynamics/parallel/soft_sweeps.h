@@ -65,7 +65,9 @@ struct SoftSweeps {
   const std::uint32_t* groups;
   const ColourPlaces* colours;  // see GroupsView
   const std::uint32_t* shared;
-  std::uint32_t* arrived;        // see Meetings
+  std::uint32_t* arrived;  // see Meetings
+  std::uint32_t* is_done;  // 1 once sweep_in_cluster() has done it all
+  std::uint32_t bodies;
   const std::uint32_t* bounces;  // 1 where any pair does
   double h;
   std::uint32_t substeps;
@@ -150,18 +152,26 @@ TANDEM_HD inline PairMotions wait_for(const SoftSweeps& all, const Sweep& sweep,
   }
 }
 
+/// Returns whether there is work at bodies after a sweep.
+TANDEM_HD inline bool has_work(const Sweep& sweep, std::uint32_t substeps) {
+  using enum Sweep::Kind;
+  return sweep.kind == start || sweep.kind == push || (sweep.kind == rub && sweep.substep + 1 != substeps);
+}
+
+/// Condition: there is such work.
+TANDEM_HD inline BodyWork work_after(const Sweep& sweep) {
+  using enum Sweep::Kind;
+  return sweep.kind == start ? BodyWork::begin : sweep.kind == push ? BodyWork::move : BodyWork::accelerate;
+}
+
 /// Hands on the velocity of a body. The last pair that visits a body in a sweep does the body's work too.
 TANDEM_HD inline void hand_on(const SoftSweeps& all, const Sweep& sweep, const Side& side,
                               SoftMotion velocity) {
-  using enum Sweep::Kind;
-  const bool is_end = sweep.kind == rub && sweep.substep + 1 == all.substeps;
-  if (side.is_last && !is_end && (sweep.kind == start || sweep.kind == push || sweep.kind == rub)) {
+  if (side.is_last && has_work(sweep, all.substeps)) {
     // No other pair writes these. They are read together.
     const SoftMotion gain = all.gains[side.body];
     SoftMotion start_of_substep = all.starts[side.body], moved = dynamics::motion_of(all.moved[side.body]);
-    const BodyWork work = sweep.kind == start  ? BodyWork::begin
-                          : sweep.kind == push ? BodyWork::move
-                                               : BodyWork::accelerate;
+    const BodyWork work = work_after(sweep);
     work_on(work, static_cast<float>(all.h), gain, start_of_substep, velocity, moved);
     if (work == BodyWork::move)
       give_turn(all.moved[side.body], sweep.substep + 1, moved);
@@ -250,6 +260,7 @@ TANDEM_HD void sweep_all(const SoftSweeps& all, const Joints& joints, const Work
   }
   if (kCanMeet && (most > kMostTasksWithoutMeeting) != kMany) return;
   if (worker.team >= most && !kMany) return;
+  if (*all.is_done != 0) return;
   Meetings meetings(all.arrived);
   const std::uint32_t sweeps = all.sweeps();
   for (std::uint32_t number = 0; number < sweeps; ++number) {

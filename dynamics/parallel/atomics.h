@@ -51,6 +51,14 @@ TANDEM_HD inline std::uint32_t atomic_add(std::uint32_t& of, std::uint32_t x) {
 #endif
 }
 
+TANDEM_HD inline void atomic_add(std::uint64_t& of, std::uint64_t x) {
+#ifdef __CUDA_ARCH__
+  atomicAdd(reinterpret_cast<unsigned long long*>(&of), static_cast<unsigned long long>(x));
+#else
+  std::atomic_ref<std::uint64_t>(of).fetch_add(x);
+#endif
+}
+
 TANDEM_HD inline void atomic_or(std::uint32_t& of, std::uint32_t bits) {
 #ifdef __CUDA_ARCH__
   if ((*static_cast<volatile std::uint32_t*>(&of) & bits) != bits) atomicOr(&of, bits);

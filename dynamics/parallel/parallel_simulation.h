@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "dynamics/parallel/pair_step.h"
+#include "dynamics/parallel/simulation_rows.h"
 #include "dynamics/parallel/sleep_step.h"
 #include "dynamics/parallel/soft_step.h"
 
@@ -103,6 +104,61 @@ class ParallelSimulation {
     if (!has_forces_) has_forces_ = true, ++generation_;
     is_new = !(before == force);
     return to_.copy(std::span<const BodyForce>(&force, 1), forces_.data() + body);
+  }
+
+  /// Adds up the contacts of the last step.
+  Status sum_contacts(ContactSums& sums) {
+    sums = {};
+    const Status status = put(sums_of_contacts_, sums);
+    if (status != Status::kOk) return status;
+    dynamics::sum_contacts(to_, arrays(), read_.pairs, sums_of_contacts_.data());
+    return to_.copy(sums_of_contacts_.data(), std::span(&sums, 1));
+  }
+
+  /// Copies what the next step starts from, but for forces and settings of bodies. bodies: as given to
+  /// set_bodies().
+  Status save(std::span<const BodyProperties> bodies, SimulationState& state) {
+    const StepArrays a = arrays();
+    std::vector<PairRecord> records(read_.pairs);
+    std::vector<CachedContact> remembered(std::min(read_.remembered, most_remembered_));
+    state.states.resize(bodies_), state.ahead.before.resize(bodies_);
+    state.quiet.resize(bodies_), state.groups.resize(bodies_);
+    for (Status status :
+         {to_.copy(a.records_before, std::span(records)),
+          to_.copy(a.remembered_before, std::span(remembered)), to_.copy(a.start, std::span(state.states)),
+          to_.copy(a.before, std::span(state.ahead.before)), to_.copy(a.quiet, std::span(state.quiet)),
+          to_.copy(a.group, std::span(state.groups))}) {
+      if (status != Status::kOk) return status;
+    }
+    keep_pairs(records, remembered, bodies, state);
+    return Status::kOk;
+  }
+
+  /// Goes on from what save() copied. Condition: set_bodies() was called with the same bodies.
+  Status resume(std::span<const BodyProperties> bodies, const SimulationState& state) {
+    const KeptPairs kept(state);
+    const auto pairs = static_cast<std::uint32_t>(kept.records.size()),
+               contacts = static_cast<std::uint32_t>(kept.remembered.size());
+    std::vector<BodyProperties> acting(bodies.begin(), bodies.end());
+    for (std::uint32_t i = 0; i < bodies_; ++i) {
+      if (state.groups[i] != Sleep::kAwake) acting[i].motion = Motion::fixed;
+    }
+    const std::span<const BodyState> before = state.ahead.before.empty() ? state.states : state.ahead.before;
+    StepCounts counts = {};
+    counts.records_before = pairs;
+    read_.pairs = pairs, read_.remembered = contacts, ++generation_;
+    Status out = pairs > most_pairs_ ? reserve_pairs(pairs) : Status::kOk;
+    if (out == Status::kOk && contacts > most_remembered_) out = reserve_contacts(most_found_, contacts);
+    const StepArrays a = arrays();
+    const auto copy = [&]<typename T>(std::span<const T> from, T* to) {
+      if (out == Status::kOk && !from.empty()) out = to_.copy(from, to);
+    };
+    copy(std::span(kept.records), a.records_before);
+    copy(std::span(kept.remembered), a.remembered_before);
+    copy(std::span(state.states), a.start), copy(before, a.before);
+    copy(std::span(std::as_const(acting)), a.acting);
+    copy(std::span(state.quiet), a.quiet), copy(std::span(state.groups), a.group);
+    return out == Status::kOk ? put(counts_, counts) : out;
   }
 
   std::uint32_t bodies() const { return bodies_; }
@@ -353,6 +409,7 @@ class ParallelSimulation {
   Array<std::uint8_t> contact_marks_;
   Array<ContactImpulse> impulses_before_, impulses_, done_;
   Array<StepCounts> counts_;
+  Array<ContactSums> sums_of_contacts_;
 };
 
 }  // namespace tandem::dynamics

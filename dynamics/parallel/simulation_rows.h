@@ -39,7 +39,7 @@ void sum_contacts(Executor& to, const StepArrays& a, std::uint32_t pairs, Contac
     for (std::uint32_t k = record.first_contact; k < record.first_contact + record.contacts; ++k) {
       const double of_contact = std::max(of.contacts[k].depth, 0.0);
       const double parts = of_contact / ContactSums::part_of(of.options.slop);
-      depth += static_cast<std::uint64_t>(std::min(parts, ContactSums::kMostParts));
+      depth += static_cast<std::uint64_t>(parts < ContactSums::kMostParts ? parts : ContactSums::kMostParts);
       deepest = std::max(deepest, of_contact);
     }
     atomic_add(sums->contacts, record.contacts);
@@ -59,12 +59,12 @@ struct KeptPairs {
     for (const PosedBodies& posed : state.posed) pairs.push_back(posed.pair);
     for (const PairApart& apart : state.ahead.apart) pairs.push_back(apart.pair);
     std::ranges::sort(pairs);
-    pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
+    pairs.erase(std::unique(pairs.begin(), pairs.end(), is_same), pairs.end());
     for (const ObjectPair& pair : pairs) records.emplace_back().pair = pair;
     std::uint32_t contact = 0;
     for (PairRecord& record : records) {
       record.first = contact;
-      while (contact < remembered.size() && remembered[contact].pair == record.pair) ++contact;
+      while (contact < remembered.size() && is_same(remembered[contact].pair, record.pair)) ++contact;
       record.count = contact - record.first;
     }
     for (const PosedBodies& posed : state.posed) {
@@ -75,8 +75,9 @@ struct KeptPairs {
     for (const PairApart& apart : state.ahead.apart)
       of(apart.pair).is_near = true, of(apart.pair).apart = apart.distance;
     for (const WorldTouch& touch : state.touching) {
-      const auto found = std::ranges::lower_bound(records, ObjectPair{touch.a, touch.b}, {}, &PairRecord::pair);
-      if (found != records.end() && found->pair == ObjectPair{touch.a, touch.b}) found->touches = true;
+      const ObjectPair pair = {touch.a, touch.b};
+      const auto found = std::ranges::lower_bound(records, pair, {}, &PairRecord::pair);
+      if (found != records.end() && is_same(found->pair, pair)) found->touches = true;
     }
   }
 

@@ -133,6 +133,15 @@ class RenderedScenes(RenderTest):
         coarse = self.picture(self.scene, *FROM_X, "--level", "2")
         self.assertGreater(np.abs(coarse - self.picture(self.scene, *FROM_X)).max(), 0.1)
 
+    def test_the_camera_can_be_on_the_ground_alone(self):
+        self.write_scene([[0, 0, 0], [0, 0, 40]], motion=[1, 0])
+        columns = lambda picture: (~self.is_backdrop(picture)).any(axis=0).sum()
+        self.assertGreater(columns(self.picture(self.scene, *FROM_X, "--on", "ground")), 10 * columns(self.picture(self.scene, *FROM_X)))
+        self.write_scene([[0, 0, 0]], motion=[0])
+        result, _ = self.render(self.scene, *FROM_X, "--on", "ground")
+        self.assertEqual(result.returncode, UNREADABLE_INPUT)
+        self.assertIn(b"holds no fixed body", result.stderr)
+
     def test_the_same_scene_gives_the_same_bytes(self):
         self.write_scene([[0, 0, 0], [0, 3, 0]])
         first = self.render(self.scene, *FROM_X, name="a.png")[1].read_bytes()

@@ -30,6 +30,25 @@ void add(StepRecord& record, const FinderReport& report) {
 
 }  // namespace
 
+void measure(std::span<const BodyProperties> bodies, std::span<const BodyState> states,
+             const Vector3& gravity, StepRecord& record) {
+  std::size_t moving = 0;
+  for (std::size_t i = 0; i < states.size(); ++i) {
+    if (bodies[i].motion != Motion::moving) continue;
+    const BodyState& state = states[i];
+    const double speed = norm(state.velocity);
+    record.kinetic_energy += kinetic_energy(bodies[i], state);
+    record.potential_energy -= bodies[i].gravity_scale * bodies[i].mass * dot(gravity, state.position);
+    record.linear_momentum += bodies[i].mass * state.velocity;
+    record.angular_momentum += angular_momentum(bodies[i], state);
+    record.speed_max = std::max(record.speed_max, speed);
+    record.speed_mean += speed;
+    record.spin_max = std::max(record.spin_max, bodies[i].radius * norm(state.angular_velocity));
+    ++moving;
+  }
+  if (moving > 0) record.speed_mean /= static_cast<double>(moving);
+}
+
 Simulation::Simulation(std::vector<BodyProperties> bodies, std::vector<BodyState> states,
                        SimulationParts parts, const SimulationOptions& options)
     : bodies_(std::move(bodies)),
@@ -56,7 +75,8 @@ StepRecord Simulation::step() {
   sleep();
   record.solver_seconds = phase.lap();
   record.time = static_cast<double>(++step_) * options_.dt;
-  take_measures(record);
+  measure(bodies_, states_, options_.gravity, record);
+  record.sleeping = sleep_.count();
   record.step_seconds = step.lap();
   return record;
 }
@@ -208,26 +228,6 @@ std::vector<Instance> Simulation::poses() const {
   poses.reserve(states_.size());
   for (std::size_t i = 0; i < states_.size(); ++i) poses.push_back(pose_of(bodies_[i], states_[i]));
   return poses;
-}
-
-void Simulation::take_measures(StepRecord& record) const {
-  std::size_t moving = 0;
-  for (std::size_t i = 0; i < states_.size(); ++i) {
-    if (bodies_[i].motion != Motion::moving) continue;
-    const BodyState& state = states_[i];
-    const double speed = norm(state.velocity);
-    record.kinetic_energy += kinetic_energy(bodies_[i], state);
-    record.potential_energy -=
-        bodies_[i].gravity_scale * bodies_[i].mass * dot(options_.gravity, state.position);
-    record.linear_momentum += bodies_[i].mass * state.velocity;
-    record.angular_momentum += angular_momentum(bodies_[i], state);
-    record.speed_max = std::max(record.speed_max, speed);
-    record.speed_mean += speed;
-    record.spin_max = std::max(record.spin_max, bodies_[i].radius * norm(state.angular_velocity));
-    ++moving;
-  }
-  if (moving > 0) record.speed_mean /= static_cast<double>(moving);
-  record.sleeping = sleep_.count();
 }
 
 void Simulation::place(std::uint32_t body, const BodyState& state) {

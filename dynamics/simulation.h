@@ -35,6 +35,10 @@ struct StepRecord : DetectionTimes {  ///< generation with what the cache takes
   double spin_max = 0;                   ///< of the fastest point about its body's centre
 };
 
+/// Sets what a record says of the bodies' states.
+void measure(std::span<const BodyProperties> bodies, std::span<const BodyState> states,
+             const Vector3& gravity, StepRecord& record);
+
 struct SimulationOptions {
   double dt = 1.0 / 60;
   Vector3 gravity = {0, 0, -9.81};
@@ -152,7 +156,6 @@ class Simulation {
   void follow_joints(double time);
   void break_joints();
   std::vector<std::uint8_t> idle() const;
-  void take_measures(StepRecord& record) const;
 
   std::vector<BodyProperties> bodies_, acting_;  // acting_: what sleeps is fixed
   std::vector<BodyState> states_;

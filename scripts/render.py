@@ -80,6 +80,24 @@ def rasterise(corners, size):
     return depth.reshape(height, width), nearest.reshape(height, width)
 
 
+def is_behind(depth, low, high, nearest):
+    """Whether all of a picture within the bounds, first and last pixels [n,2] each, is nearer than `nearest`, [n]. Bounds that reach out of it are cut."""
+    size = np.array(depth.shape[::-1])
+    low, high = np.clip(low, 0, size - 1), np.clip(high, 0, size - 1)
+    behind = np.zeros(len(low), bool)
+    step = np.ceil(np.log2((high - low).max(axis=1) + 1)).astype(int)  # blocks of which two by two hold the bounds
+    farthest = depth
+    for k in range(step.max(initial=0) + 1):
+        if k > 0:
+            farthest = np.pad(farthest, [(0, n % 2) for n in farthest.shape], constant_values=np.inf)
+            farthest = farthest.reshape(farthest.shape[0] // 2, 2, -1, 2).min(axis=(1, 3))
+        of = np.nonzero(step == k)[0]
+        (left, top), (right, bottom) = low[of].T >> k, high[of].T >> k
+        around = [farthest[row, column] for row in (top, bottom) for column in (left, right)]
+        behind[of] = np.min(around, axis=0) > nearest[of]
+    return behind
+
+
 def shrink(image, factor):
     height, width = (n // factor for n in image.shape[:2])
     blocks = image[:height * factor, :width * factor].reshape(height, factor, width, factor, 3)

@@ -21,6 +21,7 @@ GLOW = 0.85  # the light on these triangles that no shadow takes away
 SHINE = 0.92  # the share of their colour that shines through a body that hides them closely
 PALE_BODY, PALE_GROUND, PALENESS = "f4f5f6", "ffffff", 0.5
 SHADOW_PIXELS = 2048
+BODIES_AT_ONCE = 4096
 
 
 def of_colour(name):
@@ -40,11 +41,11 @@ def colours(bodies):
     return np.where(bodies.fixed[:, None], of_colour(ground), np.minimum(chosen, 1))
 
 
-def posed(bodies):
-    """All triangles in the world, the body of each, whether it is of a closed shape, and whether it meets others; of the ground none does."""
+def posed(bodies, chosen):
+    """All triangles of the chosen bodies in the world, the body of each, whether it is of a closed shape, and whether it meets others; of the ground none does."""
     found, body, closed, meets = [np.zeros((0, 3, 3))], [np.zeros(0, int)], [np.zeros(0, bool)], [np.zeros(0, bool)]
     for asset, shape in enumerate(bodies.shapes):
-        rows = np.nonzero(bodies.asset == asset)[0]
+        rows = np.nonzero((bodies.asset == asset) & chosen)[0]
         triangles = np.einsum("nij,tkj->ntki", bodies.rotation[rows], shape.triangles, optimize=True)
         triangles += bodies.translation[rows, None, None]
         found.append(triangles.reshape(-1, 3, 3))
@@ -55,12 +56,30 @@ def posed(bodies):
     return np.concatenate(found), body, np.concatenate(closed), meets & bodies.subject[body]
 
 
-def box_corners(bodies):
-    """Corners of the boxes of what has to be in the picture."""
-    chosen = bodies.subject
+def box_corners(bodies, chosen):
+    """Corners of the boxes of the chosen bodies, eight of each."""
     boxes = np.array([shape.box for shape in bodies.shapes])[bodies.asset[chosen]]
     corners = np.einsum("nij,nkj->nki", bodies.rotation[chosen], boxes) + bodies.translation[chosen, None]
     return corners.reshape(-1, 3)
+
+
+def not_hidden(bodies, chosen, project, size):
+    """Which of the chosen bodies are not surely hidden by nearer ones. Few are all asked for; many come front first, some at a time."""
+    rows = np.nonzero(chosen)[0]
+    if len(rows) <= BODIES_AT_ONCE or bodies.contacts is not None:
+        return chosen
+    corners = project(box_corners(bodies, chosen)).reshape(-1, 8, 3)
+    low, high = (np.floor(edge).astype(int) for edge in (corners[..., :2].min(axis=1), corners[..., :2].max(axis=1)))
+    nearest = corners[..., 2].max(axis=1)
+    depth, shown = np.full((size[1], size[0]), -np.inf), np.zeros(len(chosen), bool)
+    order = np.argsort(-nearest, kind="stable")
+    for some in (order[i:i + BODIES_AT_ONCE] for i in range(0, len(order), BODIES_AT_ONCE)):
+        some = some[~render.is_behind(depth, low[some], high[some], nearest[some])]
+        here = np.zeros(len(chosen), bool)
+        here[rows[some]] = True
+        shown |= here
+        depth = np.maximum(depth, render.rasterise(project(posed(bodies, here)[0]), size)[0])
+    return shown
 
 
 @dataclasses.dataclass
@@ -138,15 +157,16 @@ def take_samples(triangles, body, closed, camera):
     return Samples(covered, row, column, distance, point, normals.astype(np.float32)[chosen], kept[chosen], body[kept][chosen])
 
 
-def lit(samples, casters, bounds, light):
+def lit(samples, bodies, light):
     """Which samples see the light; shadows are soft once the samples of a pixel are averaged."""
     right = unit(np.cross([0.0, 0.0, 1.0], light))
     axes = np.array([right, np.cross(light, right), light])
-    seen = bounds @ axes.T
+    seen = box_corners(bodies, bodies.subject) @ axes.T
     low, high = seen.min(axis=0), seen.max(axis=0)
-    scale = SHADOW_PIXELS / (high - low)[:2].max()
-    facing = casters[area_vectors(casters) @ light > 0]
-    depth, _ = render.rasterise((facing @ axes.T - low) * [scale, scale, 1], (SHADOW_PIXELS, SHADOW_PIXELS))
+    scale, size = SHADOW_PIXELS / (high - low)[:2].max(), (SHADOW_PIXELS, SHADOW_PIXELS)
+    project = lambda points: (points @ axes.T - low) * [scale, scale, 1]
+    casters = posed(bodies, not_hidden(bodies, bodies.subject, project, size))[0]
+    depth, _ = render.rasterise(project(casters[area_vectors(casters) @ light > 0]), size)
     # Samples are lifted off their surface, which would shade itself otherwise: a place r pixels away on a plane at an angle t
     # to the light is nearer to it by at most r tan t, and a lift of h clears h / cos t; r <= 2.5, plus 0.7 within a pixel.
     lifted = samples.point + samples.normal * np.float32(3.2 / scale)
@@ -219,12 +239,13 @@ def backdrop(size, white):
 
 def picture(bodies, camera):
     """sRGB in 0 to 1, [height, width, 3], of the camera's size divided by SUPERSAMPLING."""
-    triangles, body, closed, meets = posed(bodies)
+    everything = np.ones(len(bodies.asset), bool)
+    triangles, body, closed, meets = posed(bodies, not_hidden(bodies, everything, camera.project, camera.size))
     samples = take_samples(triangles, body, closed, camera)
     light = unit(np.array(SUN_FROM) @ camera.axes)
     subject = bodies.subject
     diagonal = np.median(bodies.diagonals[subject])
-    sun = SUN * np.clip(samples.normal @ light, 0, 1) * lit(samples, triangles[subject[body]], box_corners(bodies), light)
+    sun = SUN * np.clip(samples.normal @ light, 0, 1) * lit(samples, bodies, light)
     sky = AMBIENT * (0.75 + 0.25 * samples.normal[:, 2])
     sky *= openness(samples, 0.4 * diagonal, camera)
     light_here = sun[:, None] * [1.05, 1.0, 0.93] + sky[:, None] * [0.95, 1.0, 1.07]

@@ -55,25 +55,30 @@ def is_closed(triangles):
     return np.array_equal(np.sort(there, axis=None), np.sort(back, axis=None))
 
 
-def read_shape(path, level):
+def read_file(path, level=0):
     try:
-        file = bvh_file.read(path, level)
-        triangles, face = file.world, file.source_face
+        return bvh_file.read(path, level)
     except (AssertionError, KeyError, struct.error) as error:
         raise ValueError(f"{path}: not a .bvh file that can be read") from error
-    return Shape(triangles, is_closed(triangles), face)
 
 
-def read_shapes(path, file, group):
-    """The shapes of the bodies in a group, /instances or /bodies, and which of them each body has: one for each asset and level of detail in use."""
+def read_shape(path, level):
+    file = read_file(path, level)
+    return Shape(file.world, is_closed(file.world), file.source_face)
+
+
+def read_shapes(path, file, group, at_level):
+    """The shapes of the bodies in a group, /instances or /bodies, and which of them each body has: one for each asset and level of detail in use, or at_level."""
     names = [name.decode() if isinstance(name, bytes) else name for name in file["assets"][:]]
     asset = file[f"{group}/asset"][:].astype(int)
     level = file[f"{group}/level"][:].astype(int) if f"{group}/level" in file else np.zeros(len(asset), int)
+    if at_level is not None:
+        level = np.array([min(at_level, len(read_file(path.parent / name).levels) - 1) for name in names])[asset]
     used, of_each = np.unique(np.stack([asset, level], 1), axis=0, return_inverse=True)
     return [read_shape(path.parent / names[row], at) for row, at in used.tolist()], of_each.reshape(-1)
 
 
-def read_run(path, file, wanted):
+def read_run(path, file, wanted, level):
     """The states after the wanted numbers of steps, or the last state where no number is wanted."""
     kept = file["trajectory/frame"][:].tolist() if "trajectory" in file else []
     if not kept:
@@ -82,7 +87,7 @@ def read_run(path, file, wanted):
         if frame not in kept:
             raise ValueError(f"does not keep the state after step {frame}, but every {kept[1] - kept[0]}th "
                              f"up to {kept[-1]}" if len(kept) > 1 else "keeps the start alone")
-    (shapes, asset), fixed = read_shapes(path, file, "bodies"), file["bodies/motion"][:] == 1
+    (shapes, asset), fixed = read_shapes(path, file, "bodies", level), file["bodies/motion"][:] == 1
     centre = file["bodies/centre_of_mass"][:]
     states = []
     for row in [kept.index(frame) for frame in wanted or kept[-1:]]:
@@ -93,8 +98,8 @@ def read_run(path, file, wanted):
     return states
 
 
-def read_scene(path, file):
-    shapes, asset = read_shapes(path, file, "instances")
+def read_scene(path, file, level):
+    shapes, asset = read_shapes(path, file, "instances", level)
     if "simulation/motion" in file:
         fixed = file["simulation/motion"][:] == 1
     else:
@@ -105,13 +110,14 @@ def read_scene(path, file):
     return [bodies]
 
 
-def read(path, wanted):
+def read(path, wanted, level=None):
+    """What stands where, for each of the frames that are wanted. level: of detail, of all bodies; None: the one that each has."""
     with h5py.File(path) as file:
         if "trajectory" in file or "bodies" in file:
-            return read_run(path, file, wanted)
+            return read_run(path, file, wanted, level)
         if wanted:
             raise ValueError("is a scene, which has no frames")
-        return read_scene(path, file)
+        return read_scene(path, file, level)
 
 
 def read_contacts(path, bodies):

@@ -144,8 +144,8 @@ class Run:
 class Workshop:
     """Builds meshes and makes runs in a folder of its own, by one solver."""
 
-    def __init__(self, folder, quick, solver="auto", seeds=range(1, 11)):
-        self.folder, self.quick, self.solver, self.seeds = Path(folder), quick, solver, seeds
+    def __init__(self, folder, quick, solver="auto", seeds=range(1, 11), backend="cpu"):
+        self.folder, self.quick, self.solver, self.seeds, self.on_gpu = Path(folder), quick, solver, seeds, backend == "cuda"
 
     @functools.cache
     def mesh(self, name):
@@ -194,5 +194,5 @@ class Workshop:
                 options += [f"--{name.replace('_', '-')}"] + ([] if value is True else [repr(value) if isinstance(value, float) else value])
         output = self.folder / "run.h5"
         keep = min(steps, max(1, round(every / dt))) if every else steps
-        tools.run(BVHBENCH, "simulate", *kind, "--frames", steps, "--threads", 1, "--trajectory", keep, *options, "-o", output)
+        tools.run(BVHBENCH, "simulate", *kind, "--frames", steps, *(("--backend", "cuda") if self.on_gpu else ("--threads", 1)), "--trajectory", keep, *options, "-o", output)
         return Run(output, " ".join(map(str, options[2:])))

@@ -28,6 +28,12 @@ struct QuestionNeeds {
   GpuDistanceCapacity distances;
 };
 
+/// Sums over the questions about contacts of a step.
+struct FoundCounts {
+  ContactCounters contacts;
+  ManifoldCounters manifolds;
+};
+
 namespace cuda_questions_detail {
 
 template <typename Number>
@@ -54,6 +60,7 @@ struct TakeManifolds {
   const GpuContactReport* contacts;
   const GpuManifoldReport* manifolds;
   QuestionNeeds* needs;
+  FoundCounts* found;
   __device__ void operator()() const {
     if (blames(*needs, *contacts)) return;
     if (contacts->complete == 0) {
@@ -63,11 +70,20 @@ struct TakeManifolds {
       return;
     }
     if (needs->status == Status::kOk) needs->status = manifolds->status;
-    if (manifolds->complete != 0) return;
+    if (manifolds->complete != 0) return count();
     raise(needs->manifolds.pairs, manifolds->needed.pairs);
     raise(needs->manifolds.contacts, manifolds->needed.contacts);
     raise(needs->manifolds.manifolds, manifolds->needed.manifolds);
     raise(needs->manifolds.points, manifolds->needed.points);
+  }
+  __device__ void count() const {
+    found->contacts.object_pairs += contacts->counters.object_pairs;
+    found->contacts.block_pairs += contacts->counters.block_pairs;
+    found->contacts.candidates += contacts->counters.candidates;
+    found->contacts.contacts += contacts->counters.contacts;
+    found->manifolds.segments += manifolds->counters.segments;
+    found->manifolds.manifolds += manifolds->counters.manifolds;
+    found->manifolds.open_curves += manifolds->counters.open_curves;
   }
 };
 
@@ -82,6 +98,11 @@ struct TakeDistances {
     raise(needs->distances.settled, report->needed.settled);
     raise(needs->distances.words, report->needed.words);
   }
+};
+
+struct ClearFound {
+  FoundCounts* found;
+  __device__ void operator()() const { *found = {}; }
 };
 
 struct Clear {
@@ -104,6 +125,7 @@ class CudaQuestions {
     if (status == Status::kOk) status = to_.wait();
     bounds_count_ = static_cast<std::uint32_t>(bounds.size());
     if (status == Status::kOk) status = status_of(needs_.reserve(1));
+    if (status == Status::kOk) status = status_of(found_.reserve(1));
     if (status == Status::kOk) status = contacts_.set_assets(assets, to_.stream());
     if (status == Status::kOk) status = manifolds_.set_assets(assets, to_.stream());
     if (status == Status::kOk) status = distances_.set_assets(assets, to_.stream());
@@ -114,6 +136,9 @@ class CudaQuestions {
   void set_filter(const PairFilter& filter) { filter_ = filter; }
 
   std::uint64_t where() const { return where_; }
+
+  /// Returns what all questions of the last step found.
+  const FoundCounts& found() const { return read_found_; }
 
   /// Returns the first error of a call of CUDA that a query has met.
   cudaError_t error() const {
@@ -144,7 +169,9 @@ class CudaQuestions {
     return provide(needs);
   }
 
+  /// Is the first question of a step.
   PairList near(const PosedList& bodies, const Motion* motion, double within) {
+    to_.once(cuda_questions_detail::ClearFound{found_.data()});
     GpuBroadPhaseOptions options = kNearOptions;
     options.filter = filter_, options.filter.motion = motion, options.within = within;
     take(near_.enqueue({bodies.asset, bodies.pose, bodies.count}, {bounds_.data(), bounds_count_}, options,
@@ -160,7 +187,8 @@ class CudaQuestions {
     take(contacts_.enqueue(instances, on_gpu, kContactOptions, to_.stream()));
     take(manifolds_.enqueue(instances, on_gpu, contacts_, {.match_previous = false}, to_.stream()));
     const GpuManifoldReport* const report = manifolds_.device_report();
-    to_.once(cuda_questions_detail::TakeManifolds{contacts_.device_report(), report, needs_.data()});
+    to_.once(cuda_questions_detail::TakeManifolds{contacts_.device_report(), report, needs_.data(),
+                                                  found_.data()});
     return {manifolds_.manifolds(), manifolds_.points(), &report->manifolds, &report->points,
             manifolds_.capacity().manifolds};
   }
@@ -181,7 +209,10 @@ class CudaQuestions {
   }
 
   /// Queues that the needs of the questions are read, for make_room() behind it.
-  void read_needs() { to_.copy_later(needs_.data(), read_); }
+  void read_needs() {
+    to_.copy_later(needs_.data(), read_);
+    to_.copy_later(found_.data(), read_found_);
+  }
 
   Status make_room(bool& grew) {
     QuestionNeeds needs = read_;
@@ -241,11 +272,13 @@ class CudaQuestions {
   CudaExecutor& to_;
   PairFilter filter_;
   QuestionNeeds read_ = {};
+  FoundCounts read_found_;
   std::uint32_t bodies_ = 0, bounds_count_ = 0;
   std::uint64_t where_ = 0;
   Status status_ = Status::kOk;  // of what the CPU finds wrong
   GpuArray<AssetBounds> bounds_;
   GpuArray<QuestionNeeds> needs_;
+  GpuArray<FoundCounts> found_;
   GpuBroadPhase near_;
   GpuContactQuery contacts_;
   GpuManifoldQuery manifolds_;

@@ -5,27 +5,18 @@
 #include <optional>
 #include <vector>
 
-#include "dynamics/cuda/cuda_executor.cuh"
-#include "dynamics/cuda/cuda_questions.cuh"
+#include "dynamics/cuda/cuda_simulation.cuh"
 #include "dynamics/cuda/parallel_newton_step.cuh"
-#include "dynamics/parallel/parallel_simulation.h"
 #include "dynamics/parallel/wake_step.h"
 #include "dynamics/world_calls.h"
 #include "dynamics/world_rows.h"
 #include "tandem/kernels/excluded_pairs.h"
-#include "tandem/runtime/upload.h"
 
 namespace tandem {
 
 using namespace dynamics;
 
 static_assert(sizeof(GpuBodyState) == sizeof(BodyState));
-
-namespace {
-
-using GpuSimulation = ParallelSimulation<CudaExecutor, CudaQuestions>;
-
-}  // namespace
 
 class GpuWorld::State {
  public:
@@ -35,22 +26,12 @@ class GpuWorld::State {
   ParallelState<CudaExecutor> simulation;
 };
 
-struct GpuWorld::Parts {
+struct GpuWorld::Parts : CudaSimulation {
   std::vector<AssetView> assets;
-  std::vector<GpuAsset> on_gpu;
-  DeviceAssets files;
-  std::vector<double> inner_radii;
-  std::vector<AssetBox> boxes;
-  cudaStream_t own_stream = nullptr;
-  CudaExecutor executor;
-  CudaQuestions questions{executor};
-  std::optional<GpuSimulation> simulation;
   std::shared_ptr<const char> placed;  // of these bodies alone; null where there are none
   std::vector<BodyProperties> properties;
-  GpuArray<std::uint32_t> group, mask, world;
-  PairFilter filter;                   // on the GPU
+  GpuFilter filter;
   std::vector<ObjectPair> kept_apart;  // by the caller
-  GpuExcludedPairs excluded;           // these, and those that joints keep from touching
 
   // These are for continuous motion, which the CPU limits.
   std::vector<std::uint32_t> host_group, host_mask, host_world;
@@ -75,13 +56,6 @@ struct GpuWorld::Parts {
   std::vector<JointMemory> joint_memory;
   std::vector<WorldJoint> joints;
   std::vector<std::uint32_t> broken;  // in the last call
-
-  Parts() = default;
-  Parts(const Parts&) = delete;
-  Parts& operator=(const Parts&) = delete;
-  ~Parts() {
-    if (own_stream != nullptr) static_cast<void>(cudaStreamDestroy(own_stream));
-  }
 
   bool has_bodies() const { return simulation.has_value() && !properties.empty(); }
   void clear() {
@@ -126,31 +100,10 @@ Status GpuWorld::set_assets(std::span<const AssetView> assets, cudaStream_t stre
   Parts& parts = *parts_;
   parts.clear();
   parts.assets.clear();
-  Scene scene;
-  if (const Status status = scene.set_assets(assets); status != Status::kOk)
-    return fail(status, scene.where());
   try {
-    // The default stream cannot be captured into a graph; one of its own waits for that, and it for this.
-    if (stream == nullptr && parts.own_stream == nullptr) {
-      const Status status = status_of(cudaStreamCreate(&parts.own_stream));
-      if (status != Status::kOk) return fail(status);
-    }
-    stream = stream != nullptr ? stream : parts.own_stream;
-    parts.executor.set_stream(stream);
-    if (const Status status = parts.files.upload(assets, Contents::all, stream); status != Status::kOk)
-      return fail(status);
-    parts.on_gpu.clear(), parts.boxes.clear();
-    for (std::size_t i = 0; i < assets.size(); ++i) {
-      const LevelView level = parts.files.level(i);
-      if (level.oriented_blocks == nullptr) return fail(Status::kNoOrientedBlocks, i);
-      if (level.topology == nullptr) return fail(Status::kNoTopology, i);
-      parts.on_gpu.push_back(gpu_asset(level, assets[i]));
-      const FileHeader& header = *assets[i].header;
-      parts.boxes.push_back(asset_box(header.lower, header.upper, header.origin));
-    }
-    parts.inner_radii = inner_radii(assets);
-    if (const Status status = parts.questions.set_assets(parts.on_gpu); status != Status::kOk)
-      return fail(status);
+    std::uint64_t blamed = 0;
+    const Status status = parts.CudaSimulation::set_assets(assets, stream, blamed);
+    if (status != Status::kOk) return fail(status, blamed);
     parts.assets.assign(assets.begin(), assets.end());
   } catch (const std::bad_alloc&) {
     return fail(Status::kOutOfMemory);
@@ -176,9 +129,7 @@ Status GpuWorld::set_bodies(std::span<const BodyDescription> bodies, const World
           std::make_unique<ContinuousMotion>(parts.assets, options.threads, &parts.host_filter);
     parts.options = {setup.options.gravity, setup.options.solver, setup.options.sleep,
                      parts.continuous.get()};
-    parts.simulation.emplace(parts.executor, parts.questions);
-    status = parts.simulation->set_bodies(
-        {setup.properties, setup.states, parts.inner_radii, parts.boxes, setup.joints}, parts.options);
+    status = parts.CudaSimulation::set_bodies(setup.properties, setup.states, setup.joints, parts.options);
     if (status != Status::kOk) {
       parts.clear();
       return fail(status);
@@ -197,15 +148,9 @@ Status GpuWorld::set_bodies(std::span<const BodyDescription> bodies, const World
 
 Status GpuWorld::Parts::upload_filter(const WorldSetup& setup) {
   host_group = setup.group, host_mask = setup.mask, host_world = setup.world;
-  Status status = Status::kOk;
-  for (const auto& [from, to] :
-       {std::pair(&host_group, &group), {&host_mask, &mask}, {&host_world, &world}}) {
-    if (status == Status::kOk) status = status_of(to->upload(*from, executor.stream()));
-  }
-  if (status == Status::kOk) status = executor.wait();
   const bool one_world = std::ranges::all_of(host_world, [](std::uint32_t of) { return of == kEveryWorld; });
-  filter = {nullptr, group.data(), mask.data(), one_world ? nullptr : world.data(), {}};
   host_filter = {nullptr, host_group.data(), host_mask.data(), one_world ? nullptr : host_world.data(), {}};
+  const Status status = filter.upload(host_filter, host_group.size(), executor);
   return status == Status::kOk ? exclude(setup.joints) : status;
 }
 
@@ -213,12 +158,11 @@ Status GpuWorld::Parts::upload_filter(const WorldSetup& setup) {
 Status GpuWorld::Parts::exclude(std::span<const Joint> joined) {
   ExcludedPairTable table;
   Status status = exclude_joined(kept_apart, joined, table);
-  if (status == Status::kOk) status = excluded.upload(table.view(), executor.stream());
-  if (status == Status::kOk) status = executor.wait();
+  if (status == Status::kOk) status = filter.exclude(table.view(), executor);
   if (status != Status::kOk) return status;
   host_excluded = std::move(table);
-  filter.excluded = excluded.view(), host_filter.excluded = host_excluded.view();
-  questions.set_filter(filter);
+  host_filter.excluded = host_excluded.view();
+  questions.set_filter(filter.view());
   if (simulation.has_value()) simulation->questions_change();
   return Status::kOk;
 }
@@ -340,19 +284,19 @@ Status GpuWorld::Parts::list(const Get& get, std::vector<Row>& rows, std::span<c
 Status GpuWorld::touching(std::span<const WorldTouch>& touching) {
   touching = {};
   if (parts_ == nullptr) return Status::kOutOfMemory;
-  return fail(parts_->list(&GpuSimulation::touching, parts_->touching, touching));
+  return fail(parts_->list(&CudaSimulation::Simulation::touching, parts_->touching, touching));
 }
 
 Status GpuWorld::began(std::span<const WorldTouch>& began) {
   began = {};
   if (parts_ == nullptr) return Status::kOutOfMemory;
-  return fail(parts_->list(&GpuSimulation::began, parts_->began, began));
+  return fail(parts_->list(&CudaSimulation::Simulation::began, parts_->began, began));
 }
 
 Status GpuWorld::ended(std::span<const ObjectPair>& ended) {
   ended = {};
   if (parts_ == nullptr) return Status::kOutOfMemory;
-  return fail(parts_->list(&GpuSimulation::ended, parts_->ended, ended));
+  return fail(parts_->list(&CudaSimulation::Simulation::ended, parts_->ended, ended));
 }
 
 Status GpuWorld::joints(std::span<const WorldJoint>& joints) {
@@ -537,8 +481,7 @@ double GpuWorld::mass_of(std::uint32_t body) const {
 cudaError_t GpuWorld::cuda_error() const {
   if (parts_ == nullptr) return cudaErrorUnknown;
   const Parts& parts = *parts_;
-  for (const cudaError_t error : {parts.files.cuda_error(), parts.excluded.cuda_error(),
-                                  parts.executor.error(), parts.questions.error()}) {
+  for (const cudaError_t error : {parts.error(), parts.filter.error()}) {
     if (error != cudaSuccess) return error;
   }
   return cudaErrorUnknown;
@@ -555,8 +498,7 @@ std::uint64_t GpuWorld::where() const {
 std::size_t GpuWorld::bytes() const {
   if (parts_ == nullptr) return 0;
   const Parts& parts = *parts_;
-  return bytes_of(parts.executor, parts.questions, parts.group, parts.mask, parts.world, parts.excluded) +
-         (parts.simulation.has_value() ? parts.simulation->bytes() : 0);
+  return parts.CudaSimulation::bytes() + parts.filter.bytes();
 }
 
 }  // namespace tandem

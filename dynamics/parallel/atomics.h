@@ -51,6 +51,14 @@ TANDEM_HD inline std::uint32_t atomic_add(std::uint32_t& of, std::uint32_t x) {
 #endif
 }
 
+TANDEM_HD inline void atomic_add(std::uint64_t& of, std::uint64_t x) {
+#ifdef __CUDA_ARCH__
+  atomicAdd(reinterpret_cast<unsigned long long*>(&of), static_cast<unsigned long long>(x));
+#else
+  std::atomic_ref<std::uint64_t>(of).fetch_add(x);
+#endif
+}
+
 /// Returns a number that others may be changing.
 TANDEM_HD inline std::uint32_t look_at(const std::uint32_t& from) {
 #ifdef __CUDA_ARCH__

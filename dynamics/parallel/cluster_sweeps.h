@@ -55,6 +55,9 @@ TANDEM_HD inline std::uint32_t contacts_of(const SoftSweeps& all, std::uint32_t 
   return last.first + last.contacts - first_contact_of(all, task);
 }
 
+// PairVisit has internal linkage, and so has what is made with it.
+namespace {
+
 class Sweeper {
  public:
   TANDEM_HD Sweeper(const SoftSweeps& all, const ClusterWorker& worker)
@@ -248,7 +251,7 @@ class Sweeper {
       if (at[side] != nullptr) velocities[side] = at[side]->velocity;
       if (at[side] != nullptr && follows) moved[side] = at[side]->moved;
     }
-    PairVisit<OneLane, kClusterReadsAhead> pair(rows, group, lane);
+    PairVisit<OneLane> pair(rows, group, lane);
     const MotionOf<OneLane> moved_lanes[2] = {lanes_of(moved[0]), lanes_of(moved[1])};
     soft_sweeps_detail::visit(all_, sweep, pair, moved_lanes, [&] {
       pair.begin(lanes_of(velocities[0]), lanes_of(velocities[1]));
@@ -271,14 +274,14 @@ class Sweeper {
     body.velocity = velocity;
   }
 
-  static constexpr bool kClusterReadsAhead = false;
-
   const SoftSweeps& all_;
   const ClusterWorker& worker_;
   Plan* plan_;
   std::uint32_t tasks_, slots_, shift_ = 0;
   Body* bodies_;
 };
+
+}  // namespace
 
 }  // namespace cluster_sweeps_detail
 

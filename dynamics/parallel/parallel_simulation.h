@@ -9,6 +9,7 @@
 #include "dynamics/parallel/newton_step.h"
 #include "dynamics/parallel/pair_step.h"
 #include "dynamics/parallel/parallel_joints.h"
+#include "dynamics/parallel/simulation_rows.h"
 #include "dynamics/parallel/sleep_step.h"
 #include "dynamics/parallel/soft_step.h"
 #include "dynamics/parallel/touch_lists.h"
@@ -202,7 +203,7 @@ class ParallelSimulation {
                     touches_[1], begun_[0], begun_[1], plans_, flags_, sums_, list_, row_first_, row_end_,
                     asked_, moved_pairs_, reach_, moved_asset_, moved_pose_, approaches_, touching_, found_,
                     contacts_, remembered_[0], remembered_[1], place_, contact_marks_, impulses_before_,
-                    impulses_, done_, counts_, listed_touches_, listed_pairs_);
+                    impulses_, done_, counts_, sums_of_contacts_, listed_touches_, listed_pairs_);
   }
 
   /// The joints, by the place of each: what Simulation's functions of these names do. That joined bodies meet
@@ -231,6 +232,60 @@ class ParallelSimulation {
     return joints_.remove(to_, joint);
   }
   void questions_change() { ++generation_; }
+
+  /// Adds up the contacts of the last step.
+  Status sum_contacts(ContactSums& sums) {
+    sums = {};
+    const Status status = put(sums_of_contacts_, sums);
+    if (status != Status::kOk) return status;
+    dynamics::sum_contacts(to_, arrays(), records_count_, sums_of_contacts_.data());
+    return to_.copy(sums_of_contacts_.data(), std::span(&sums, 1));
+  }
+
+  /// Copies what the next step starts from to the CPU, but for forces, settings of bodies, touches and joints;
+  /// and lets a simulation of the same bodies go on from there. bodies: as given to set_bodies().
+  Status save(std::span<const BodyProperties> bodies, SimulationState& state) {
+    const StepArrays a = arrays();
+    std::vector<PairRecord> records(records_count_);
+    std::vector<CachedContact> remembered(remembered_count_);
+    state.states.resize(bodies_), state.ahead.before.resize(bodies_);
+    state.quiet.resize(bodies_), state.groups.resize(bodies_);
+    for (Status status :
+         {to_.copy(a.records_before, std::span(records)),
+          to_.copy(a.remembered_before, std::span(remembered)), to_.copy(a.start, std::span(state.states)),
+          to_.copy(a.before, std::span(state.ahead.before)), to_.copy(a.quiet, std::span(state.quiet)),
+          to_.copy(a.group, std::span(state.groups))}) {
+      if (status != Status::kOk) return status;
+    }
+    keep_pairs(records, remembered, bodies, state);
+    return Status::kOk;
+  }
+  Status restore(std::span<const BodyProperties> bodies, const SimulationState& state) {
+    const KeptPairs kept(state);
+    records_count_ = static_cast<std::uint32_t>(kept.records.size());
+    remembered_count_ = static_cast<std::uint32_t>(kept.remembered.size());
+    std::vector<BodyProperties> acting(bodies.begin(), bodies.end());
+    for (std::uint32_t i = 0; i < bodies_; ++i) {
+      if (state.groups[i] != Sleep::kAwake) acting[i].motion = Motion::fixed;
+    }
+    Status out = records_count_ > most_pairs_ ? reserve_pairs(records_count_) : Status::kOk;
+    if (out == Status::kOk && remembered_count_ > most_remembered_)
+      out = reserve_contacts(most_found_, remembered_count_);
+    ++generation_;
+    const StepArrays a = arrays();
+    const auto copy = [&]<typename T>(std::span<const T> from, T* to) {
+      if (out == Status::kOk && !from.empty()) out = to_.copy(from, to);
+    };
+    const std::span<const BodyState> states = state.states, before = state.ahead.before;
+    copy(std::span(kept.records), a.records_before);
+    copy(std::span(kept.remembered), a.remembered_before);
+    copy(states, a.start), copy(before.empty() ? states : before, a.before);
+    copy(std::span(std::as_const(acting)), a.acting);
+    copy(std::span(state.quiet), a.quiet), copy(std::span(state.groups), a.group);
+    StepCounts counts = {};
+    counts.records_before = records_count_;
+    return out == Status::kOk ? put(counts_, counts) : out;
+  }
 
   std::uint32_t bodies() const { return bodies_; }
   std::uint32_t bad_body() const { return std::min(read_.bad_start, read_.bad_body); }
@@ -583,6 +638,7 @@ class ParallelSimulation {
 
   Array<WorldTouch> listed_touches_;
   Array<ObjectPair> listed_pairs_;
+  Array<ContactSums> sums_of_contacts_;
 };
 
 }  // namespace tandem::dynamics

@@ -209,6 +209,44 @@ TEST(ParallelStep, FindsWhatAStepMissed) {
   EXPECT_GT(both.missed, 0u);
 }
 
+// Like a run file, which has neither distances nor where bodies were a step before.
+TEST(ParallelStep, GoesOnFromWhatASimulationKept) {
+  const FallingBodies bodies(24);
+  BothWays one(bodies);
+  for (int step = 0; step < 100; ++step) one.step(step);
+  SimulationState state, end;
+  ASSERT_EQ(one.parallel.save(one.simulation->bodies(), state), Status::kOk);
+  EXPECT_GT(state.contacts.size(), 20u);
+  EXPECT_GT(state.posed.size(), 2u);
+  state.ahead = {};
+  BothWays other(bodies);
+  ASSERT_EQ(other.parallel.restore(other.simulation->bodies(), state), Status::kOk);
+  for (int step = 100; step < 160; ++step) {
+    one.step(step);
+    ASSERT_EQ(other.parallel.step(1.0 / 60), Status::kOk);
+    for (std::uint32_t i = 0; i < one.parallel.bodies(); ++i)
+      ASSERT_TRUE(same_bytes(one.states()[i], other.states()[i])) << "step " << step << " body " << i;
+  }
+}
+
+TEST(ParallelStep, AddsUpItsContacts) {
+  const FallingBodies bodies(24);
+  BothWays both(bodies);
+  for (int step = 0; step < 120; ++step) both.step(step);
+  ContactSums sums;
+  ASSERT_EQ(both.parallel.sum_contacts(sums), Status::kOk);
+  double deepest = 0, sum = 0;
+  for (const ContactPoint& contact : both.simulation->contacts())
+    deepest = std::max(deepest, contact.depth), sum += std::max(contact.depth, 0.0);
+  const auto count = both.simulation->contacts().size();
+  ASSERT_GT(count, 20u);
+  ASSERT_GT(sum, 0);
+  EXPECT_EQ(sums.contacts, count);
+  EXPECT_EQ(sums.deepest, deepest);
+  const double slop = both.parallel.arrays().options.slop, mean = sum / static_cast<double>(count);
+  EXPECT_NEAR(sums.mean_depth(slop), mean, 1e-5 * slop);
+}
+
 TEST(ParallelStep, IsMadeAgainWhereRoomIsShort) {
   FallingBodies many(1);
   for (int i = 0; i < 700; ++i) {

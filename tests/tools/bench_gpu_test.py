@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""bvhbench query, impact and deform --backend cuda from the outside. Environment: that of bench_test.py."""
+"""bvhbench query, impact, deform and simulate --backend cuda from the outside. Environment: that of bench_test.py."""
 import json
 import os
 import re
@@ -95,6 +95,52 @@ class BenchGpu(BenchTest):
                 self.assert_fails(self.bench("query", self.scene, *words), USAGE, words[-2] if words[-1] == "2" else "--")
 
         self.assert_fails(self.bench("impact", self.scene, "--dt", "1", *self.ON_GPU, "--threads", "2"), USAGE, "--threads")
+
+    def simulate(self, *arguments, out, **options):
+        cow, ground = (self.mesh_of(name, (SOURCE_DIR / f"assets/{name}.obj").read_bytes()) for name in ("cow_1500", "ground"))
+        return self.bench("simulate", "pile", "--mesh", cow, "--ground", ground, "--count", "20", *arguments, "-o", out, **options)
+
+    def contents(self, path):
+        """All of a run file but what is measured."""
+        found = {}
+        with h5py.File(path) as file:
+            file.visititems(lambda name, item: found.update({name: item[:].tobytes()}) if isinstance(item, h5py.Dataset) and "/seconds/" not in name else None)
+        return found
+
+    def test_simulate_tells_why_there_is_no_gpu_and_which_options_are_for_the_cpu(self):
+        out = self.outputs / "run.h5"
+        result = self.simulate("--frames", "1", *self.ON_GPU, out=out, env={**os.environ, "CUDA_VISIBLE_DEVICES": ""})
+        if not self.built:
+            return self.assert_fails(result, USAGE, "built without CUDA")
+        self.assert_fails(result, UNUSABLE_GPU, "--backend cuda: there is no GPU that can be used: ")
+        for words in (["--solver", "sweeps"], ["--engine", "fcl"], ["--fast"], ["--ask-all"], ["--cold"], ["--threads", "2"]):
+            self.assert_fails(self.simulate("--frames", "1", *self.ON_GPU, *words, out=out), USAGE, words[0], "backend cpu")
+        self.assertFalse(out.exists())
+
+    def test_a_pile_on_the_gpu_comes_to_rest_as_on_the_cpu(self):
+        self.need_gpu()
+        ends = []
+        for words in (["--solver", "soft"], ["--solver", "soft", *self.ON_GPU]):
+            out = self.outputs / f"{len(words)}.h5"
+            result = self.simulate("--frames", "360", "--sleep", *words, out=out)
+            self.assertEqual((result.returncode, result.stderr), (DONE, b""))
+            with h5py.File(out) as file:
+                ends.append({name: file[f"frames/{name}"][-1] for name in ("sleeping", "contacts", "potential_energy", "penetration_max", "speed_max", "kinetic_energy")})
+                self.assertGreater(file["frames/triangle_pairs"][:].max(), 100)
+        cpu, gpu = ends
+        self.assertEqual((cpu["sleeping"], gpu["sleeping"], gpu["speed_max"], gpu["kinetic_energy"]), (20, 20, 0, 0))
+        self.assertAlmostEqual(gpu["potential_energy"] / cpu["potential_energy"], 1, delta=0.1)
+
+    def test_a_run_on_the_gpu_goes_on_to_the_same_bytes(self):
+        self.need_gpu()
+        whole, part = self.outputs / "whole.h5", self.outputs / "part.h5"
+        self.simulate("--frames", "120", *self.ON_GPU, out=whole)
+        self.simulate("--frames", "50", *self.ON_GPU, out=part)
+        part.rename(f"{part}.part")
+        self.simulate("--frames", "120", "--resume", *self.ON_GPU, out=part)
+        expected, found = self.contents(whole), self.contents(part)
+        self.assertEqual([name for name in expected if expected[name] != found[name]], [])
+        self.assertGreater(len(expected["state/contacts/depth"]), 100)
 
     def need_gpu(self):
         self.write_scene()

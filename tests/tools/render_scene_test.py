@@ -6,12 +6,15 @@ Environment: that of tool_test.py, TANDEM_BVHBENCH, and PYTHONPATH with scripts/
 import os
 import sys
 import unittest
+import unittest.mock
 
 import matplotlib.image
 import numpy as np
 
 import render
-from bench_test import BenchTest, change
+import scene_picture
+from bench_test import BVHBUILD, BenchTest, change
+from scene_states import read
 from tool_test import DONE, SOURCE_DIR, UNREADABLE_INPUT
 
 SLAB_OBJ = "v -20 -20 0\nv 20 -20 0\nv 20 20 0\nv -20 20 0\nf 1 2 3 4\n"
@@ -105,6 +108,39 @@ class RenderedScenes(RenderTest):
         left, right = (picture[60:80, columns].mean() for columns in (slice(24, 30), slice(90, 96)))
         self.assertLess(right, 0.8 * left)
         self.assertGreater(right, 0.2)  # no black holes
+
+    def test_bodies_that_others_hide_need_not_be_drawn(self):
+        random = np.random.default_rng(3)
+        self.write_scene(random.uniform(-2, 2, (300, 3)).tolist())
+        (state,) = read(self.scene, [])
+        camera = scene_picture.camera_on(scene_picture.box_corners(state, state.subject), render.axes_of_view(-60, 24), (360, 240))
+        everything = np.ones(300, bool)
+        whole = scene_picture.picture(state, camera)
+        with unittest.mock.patch.object(scene_picture, "BODIES_AT_ONCE", 7):
+            shown = scene_picture.not_hidden(state, everything, camera.project, camera.size)
+            np.testing.assert_array_equal(scene_picture.picture(state, camera), whole)
+        self.assertLess(shown.sum(), 280)
+
+    def test_bodies_are_drawn_by_a_coarser_level(self):
+        self.mesh = self.inputs / "levels.bvh"
+        self.succeeds(BVHBUILD, SOURCE_DIR / "assets/cow_1500.obj", "-o", self.mesh, "--levels", "2%,10%")
+        self.write_scene([[0, 0, 0]])
+        change(self.scene, assets=[f"../in/{self.mesh.name}"])
+        counts = [len(read(self.scene, [], level)[0].shapes[0].triangles) for level in (None, 1, 2, 9)]
+        self.assertEqual(counts, sorted(counts, reverse=True))
+        self.assertEqual((counts[0], counts[2]), (1500, counts[3]))
+        self.assertGreater(counts[1], counts[2])
+        coarse = self.picture(self.scene, *FROM_X, "--level", "2")
+        self.assertGreater(np.abs(coarse - self.picture(self.scene, *FROM_X)).max(), 0.1)
+
+    def test_the_camera_can_be_on_the_ground_alone(self):
+        self.write_scene([[0, 0, 0], [0, 0, 40]], motion=[1, 0])
+        columns = lambda picture: (~self.is_backdrop(picture)).any(axis=0).sum()
+        self.assertGreater(columns(self.picture(self.scene, *FROM_X, "--on", "ground")), 10 * columns(self.picture(self.scene, *FROM_X)))
+        self.write_scene([[0, 0, 0]], motion=[0])
+        result, _ = self.render(self.scene, *FROM_X, "--on", "ground")
+        self.assertEqual(result.returncode, UNREADABLE_INPUT)
+        self.assertIn(b"holds no fixed body", result.stderr)
 
     def test_the_same_scene_gives_the_same_bytes(self):
         self.write_scene([[0, 0, 0], [0, 3, 0]])

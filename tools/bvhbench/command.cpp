@@ -50,8 +50,8 @@ OptionRow scene_argument(CommonArguments& arguments, const std::string& what) {
 }
 
 OptionRow backend_option(CommonArguments& arguments) {
-  return {"--backend", arguments.backend, has_cuda() ? "cpu|cuda [cpu]" : "cpu [cpu]",
-          "what the query runs on", backend_defect};
+  return {"--backend", arguments.backend, has_cuda() ? "cpu|cuda [cpu]" : "cpu [cpu]", "what it runs on",
+          backend_defect};
 }
 
 OptionRow threads_option(CommonArguments& arguments, const std::string& what) {

@@ -5,6 +5,7 @@
 #include "bvhbench/engines/registry.h"
 #include "bvhbench/scenes/hdf5_file.h"
 #include "bvhbench/scenes/make_scene.h"
+#include "bvhbench/simulator/body_mover.h"
 #include "bvhbench/simulator/preparation.h"
 #include "bvhbench/simulator/run.h"
 #include "command.h"
@@ -110,6 +111,7 @@ Json options_of(const char* kind, const SimulateArguments& arguments, const Star
   return {{"configuration", kind},
           {"start", hexadecimal(simulation::hash_of(start.bodies.bodies, start.bodies.states, start.scene))},
           {"seed", arguments.seed},
+          {"backend", arguments.backend},
           {"engine", arguments.engine},
           {"mode", arguments.fast ? "fast" : "exact"},
           {"points_per_patch", kMostManifoldPoints},
@@ -213,8 +215,45 @@ void check_solver_options(const SimulateArguments& arguments) {
   refuse(given.shock_propagation, "--shock");
 }
 
+// Refuses options that a GPU would not look at.
+void check_gpu_options(const SimulateArguments& arguments) {
+  if (!arguments.on_gpu()) return;
+  const auto refuse = [](bool is_given, const char* option) {
+    if (is_given) throw UsageError(std::string(option) + " is for the backend cpu");
+  };
+  refuse(arguments.simulator.solver.method == SolverMethod::sweeps, "--solver sweeps");
+  refuse(arguments.engine != SimulateArguments().engine, "--engine");
+  refuse(arguments.fast, "--fast");
+  refuse(arguments.ask_all, "--ask-all");
+  refuse(arguments.cold, "--cold");
+  refuse(arguments.told_threads.has_value() && !arguments.continuous, "--threads");
+}
+
+std::unique_ptr<BodyMover> make_mover(const SimulateArguments& arguments, const Start& start) {
+  const SimulatorOptions& options = arguments.simulator;
+  const auto& [bodies, states, findings, triangles] = start.bodies;
+  if (arguments.on_gpu()) return make_gpu_mover(start.shapes(), bodies, states, start.filter, options, arguments.continuous);
+  auto engine = make_engine(arguments.engine,
+                            ContactOptions{.mode = arguments.fast ? QueryMode::fast : QueryMode::exact});
+  engine->set_filter(start.filter);
+  std::unique_ptr<ContactsAhead> ahead;
+  if (options.solver.method != SolverMethod::sweeps)
+    ahead = std::make_unique<ContactsAhead>(start.shapes(), options.threads, &start.filter);
+  std::unique_ptr<ContinuousMotion> continuous;
+  if (arguments.continuous)
+    continuous = std::make_unique<ContinuousMotion>(start.shapes(), options.threads, &start.filter);
+  // World does the same.
+  const bool is_world = arguments.engine == "tandem" && !arguments.fast && !arguments.ask_all;
+  auto contacts = is_world ? make_scene_contacts(start.shapes(), options.threads, &start.filter)
+                           : make_mesh_contact_finder(std::move(engine), start.shapes(), options.threads,
+                                                      arguments.ask_all);
+  return std::make_unique<MovesBy<Simulator>>(bodies, states, std::move(contacts), options,
+                                              std::move(continuous), std::move(ahead));
+}
+
 ExitCode run(const char* kind, SimulateArguments arguments, const SetUp& set_up) {
   check_solver_options(arguments);
+  check_gpu_options(arguments);
   check_output(arguments, {arguments.mesh, arguments.ground, arguments.scene});
   arguments.run.output = arguments.output;
   Start start;
@@ -238,23 +277,8 @@ ExitCode run(const char* kind, SimulateArguments arguments, const SetUp& set_up)
     std::printf("%s: is done\n", arguments.output.c_str());
     return kDone;
   }
-  auto engine = make_engine(arguments.engine,
-                            ContactOptions{.mode = arguments.fast ? QueryMode::fast : QueryMode::exact});
-  engine->set_filter(start.filter);
-  std::unique_ptr<ContactsAhead> ahead;
-  if (options.solver.method != SolverMethod::sweeps)
-    ahead = std::make_unique<ContactsAhead>(start.shapes(), options.threads, &start.filter);
-  std::unique_ptr<ContinuousMotion> continuous;
-  if (arguments.continuous)
-    continuous = std::make_unique<ContinuousMotion>(start.shapes(), options.threads, &start.filter);
-  // World does the same.
-  const bool is_world = arguments.engine == "tandem" && !arguments.fast && !arguments.ask_all;
-  Simulator simulator(start.bodies.bodies, start.bodies.states,
-                      is_world ? make_scene_contacts(start.shapes(), options.threads, &start.filter)
-                               : make_mesh_contact_finder(std::move(engine), start.shapes(), options.threads,
-                                                          arguments.ask_all),
-                      options, std::move(continuous), std::move(ahead));
-  const RunResults results = run_simulation(simulator, description, start.reentry, arguments.run);
+  const auto mover = make_mover(arguments, start);
+  const RunResults results = run_simulation(*mover, description, start.reentry, arguments.run);
   print(arguments, report_of(kind, arguments, description, results));
   return kDone;
 }
@@ -321,6 +345,7 @@ void add_run_options(Command command, SimulateArguments& arguments) {
   RunOptions& run = arguments.run;
   command.add(
       {required({"--frames", run.steps, "N", "steps to make", between(1, 1'000'000'000)}),
+       backend_option(arguments),
        {"--engine", arguments.engine, "NAME [tandem]", "what finds the triangles that meet", engine_defect},
        {"--fast", arguments.fast, "let the engine decide triangles in float32"},
        {"--ask-all", arguments.ask_all,

@@ -34,6 +34,11 @@ std::string reason_of(Status status, cudaError_t error) {
 
 }  // namespace
 
+GpuError gpu_error(std::string_view who, Status status, cudaError_t error, const char* step) {
+  const std::string told = error == cudaSuccess ? "" : std::string(": ") + cudaGetErrorString(error);
+  return GpuError(std::string(who) + ": " + explain(status) + told, status, step, reason_of(status, error));
+}
+
 // The context is made first, so that nothing that is timed is charged with it.
 GpuEngine::GpuEngine(std::string_view name, const GpuNeeds& needs) : Engine(name), needs_(needs) {
   std::size_t total = 0;
@@ -46,8 +51,7 @@ void GpuEngine::check(Status status, cudaError_t error, const char* step) const 
   if (status == Status::kOk) return;
   if (status == Status::kOutOfMemory) throw std::bad_alloc();
   if (status == Status::kNoOrientedBlocks) require(status, 0);
-  const std::string told = error == cudaSuccess ? "" : std::string(": ") + cudaGetErrorString(error);
-  throw GpuError(std::string(name()) + ": " + explain(status) + told, status, step, reason_of(status, error));
+  throw gpu_error(name(), status, error, step);
 }
 
 void GpuEngine::check(cudaError_t error, const char* step) const {

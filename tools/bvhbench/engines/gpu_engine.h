@@ -41,6 +41,10 @@ struct DeformingShapes {
   std::function<void()> refit;                            ///< queues the call
 };
 
+/// Returns the error of a call that failed, which is not kOk. who: begins its text; step: what was being
+/// done.
+GpuError gpu_error(std::string_view who, Status status, cudaError_t error, const char* step);
+
 /// Says what a question on a GPU takes of a scene.
 struct GpuNeeds {
   Contents contents = Contents::all;  ///< of the shapes

@@ -16,9 +16,9 @@
 namespace tandem::simulation {
 namespace {
 
-bool is_free(const Simulator& simulator, std::uint32_t body, const Vector3& position) {
-  const auto bodies = simulator.bodies();
-  const auto states = simulator.states();
+bool is_free(const BodyMover& mover, std::uint32_t body, const Vector3& position) {
+  const auto bodies = mover.bodies();
+  const auto states = mover.states();
   for (std::uint32_t i = 0; i < bodies.size(); ++i) {
     if (i == body || bodies[i].motion != Motion::moving) continue;
     const double reach = bodies[i].radius + bodies[body].radius;
@@ -126,8 +126,8 @@ class Checkpoints {
 };
 
 // Refuses a state that no further step can start from, such as that of a body whose speed has overflowed.
-void check_states(const Simulator& simulator, const std::string& output, std::uint32_t step) {
-  const auto states = simulator.states();
+void check_states(const BodyMover& mover, const std::string& output, std::uint32_t step) {
+  const auto states = mover.states();
   const auto lost = std::find_if_not(states.begin(), states.end(), is_usable);
   if (lost == states.end()) return;
   throw bench::FileError(output + ": step " + std::to_string(step) + ": body " +
@@ -136,10 +136,10 @@ void check_states(const Simulator& simulator, const std::string& output, std::ui
 }
 
 // Makes a step. What an engine refuses is told by the step and the body.
-StepRecord make_step(Simulator& simulator, const std::string& output, std::uint32_t step) {
+StepRecord make_step(BodyMover& mover, const std::string& output, std::uint32_t step) {
   try {
-    StepRecord record = simulator.step();
-    check_states(simulator, output, step);
+    StepRecord record = mover.step();
+    check_states(mover, output, step);
     return record;
   } catch (const EngineError& error) {
     throw bench::FileError(output + ": step " + std::to_string(step) + ": " + error.what());
@@ -150,15 +150,15 @@ StepRecord make_step(Simulator& simulator, const std::string& output, std::uint3
   }
 }
 
-RunResults start(Simulator& simulator, const RunDescription& run, const RunOptions& options) {
+RunResults start(BodyMover& mover, const RunDescription& run, const RunOptions& options) {
   const std::string part = part_file(options.output);
   RunResults results;
   if (options.resume && std::filesystem::exists(part)) {
     results = read_run(part, run);
-    simulator.restore(results.state);
+    mover.restore(results.state);
   } else {
     results.trajectory.every = options.trajectory_every;
-    results.trajectory.keep(0, simulator.states());
+    results.trajectory.keep(0, mover.states());
   }
   results.trajectory.every = options.trajectory_every;
   return results;
@@ -189,9 +189,9 @@ bool Reentry::has_left(const Vector3& position, double radius) const {
   return beside || seen.z < lower_.z - radius;
 }
 
-BodyState Reentry::entry(const Simulator& simulator, std::uint32_t body, std::uint64_t step) const {
+BodyState Reentry::entry(const BodyMover& mover, std::uint32_t body, std::uint64_t step) const {
   constexpr int kTriesAtAHeight = 30;
-  const double radius = simulator.bodies()[body].radius;
+  const double radius = mover.bodies()[body].radius;
   Random random(seed_ * 0x9E3779B97F4A7C15u + step * 0xC2B2AE3D27D4EB4Fu + body);
   BodyState state;
   const Rotation turned = random_rotation(random);
@@ -205,17 +205,17 @@ BodyState Reentry::entry(const Simulator& simulator, std::uint32_t body, std::ui
       const double along = lower_.x + random.between(radius, 3 * radius);
       const double across = random.between(lower_.y + radius, upper_.y - radius);
       state.position = frame_ * Vector3{along, across, height};
-      if (is_free(simulator, body, state.position)) return state;
+      if (is_free(mover, body, state.position)) return state;
     }
   }
 }
 
-std::uint64_t Reentry::apply(Simulator& simulator, std::uint64_t step) const {
+std::uint64_t Reentry::apply(BodyMover& mover, std::uint64_t step) const {
   std::uint64_t count = 0;
-  for (std::uint32_t i = 0; i < simulator.bodies().size(); ++i) {
-    const BodyProperties& body = simulator.bodies()[i];
-    if (body.motion != Motion::moving || !has_left(simulator.states()[i].position, body.radius)) continue;
-    simulator.place(i, entry(simulator, i, step));
+  for (std::uint32_t i = 0; i < mover.bodies().size(); ++i) {
+    const BodyProperties& body = mover.bodies()[i];
+    if (body.motion != Motion::moving || !has_left(mover.states()[i].position, body.radius)) continue;
+    mover.place(i, entry(mover, i, step));
     ++count;
   }
   return count;
@@ -225,26 +225,26 @@ std::string part_file(const std::string& output) {
   return output + ".part";
 }
 
-RunResults run_simulation(Simulator& simulator, const RunDescription& run,
-                          const std::optional<Reentry>& reentry, const RunOptions& options) {
-  RunResults results = start(simulator, run, options);
+RunResults run_simulation(BodyMover& mover, const RunDescription& run, const std::optional<Reentry>& reentry,
+                          const RunOptions& options) {
+  RunResults results = start(mover, run, options);
   const SignalNotes signals;
   const std::string part = part_file(options.output);
   ProgressLine progress(options.output, options.steps);
   Checkpoints checkpoints(options.checkpoint_seconds);
   const auto write = [&](const std::string& path) {
-    results.state = simulator.save();
+    results.state = mover.save();
     write_run(path, run, results);
   };
   while (results.records.size() < options.steps) {
     const auto made = static_cast<std::uint32_t>(results.records.size() + 1);
-    StepRecord record = make_step(simulator, options.output, made);
+    StepRecord record = make_step(mover, options.output, made);
     if (run.triangles > 0) {
       record.contact_ratio = static_cast<double>(record.triangle_pairs) / static_cast<double>(run.triangles);
     }
-    if (reentry) record.reentered = reentry->apply(simulator, made);
+    if (reentry) record.reentered = reentry->apply(mover, made);
     results.records.push_back(record);
-    results.trajectory.keep(made, simulator.states());
+    results.trajectory.keep(made, mover.states());
     progress.show(made, record);
     if (signals.any()) {
       write(part);

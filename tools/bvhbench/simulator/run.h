@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "body_mover.h"
 #include "run_file.h"
 #include "tandem/formats/view.h"
 
@@ -19,11 +20,11 @@ class Reentry {
 
   /// Every body whose centre of mass is no longer above the ground comes to rest above the ground's upper
   /// edge, turned at random, where no bounding sphere of another body is. Result: how many.
-  std::uint64_t apply(Simulator& simulator, std::uint64_t step) const;
+  std::uint64_t apply(BodyMover& mover, std::uint64_t step) const;
 
  private:
   bool has_left(const Vector3& position, double radius) const;
-  BodyState entry(const Simulator& simulator, std::uint32_t body, std::uint64_t step) const;
+  BodyState entry(const BodyMover& mover, std::uint32_t body, std::uint64_t step) const;
 
   Matrix3 frame_;          // columns: downhill, across, up from the ground
   Vector3 lower_, upper_;  // of the ground, in that frame
@@ -47,7 +48,7 @@ struct RunOptions {
 /// where standard error is a terminal. Result: all the run has given. Throws bench::OutputError;
 /// bench::FileError where a step fails, by its number and the body, and of the part file; what the contact
 /// finder throws.
-RunResults run_simulation(Simulator& simulator, const RunDescription& run,
-                          const std::optional<Reentry>& reentry, const RunOptions& options);
+RunResults run_simulation(BodyMover& mover, const RunDescription& run, const std::optional<Reentry>& reentry,
+                          const RunOptions& options);
 
 }  // namespace tandem::simulation

@@ -1,18 +1,17 @@
 #include "simulator.h"
 
 namespace tandem::simulation {
-namespace {
+std::uint32_t default_substeps(SolverMethod method) {
+  return method == SolverMethod::sweeps ? 1 : dynamics::SolverOptions().substeps;
+}
 
 SimulationOptions options_of(const SimulatorOptions& options) {
   SimulationOptions out = options;
   out.solver = options.solver;
+  out.solver.kind = options.solver.method == SolverMethod::sweeps
+                        ? SolverKind::soft
+                        : static_cast<SolverKind>(options.solver.method);
   return out;
-}
-
-}  // namespace
-
-std::uint32_t default_substeps(SolverMethod method) {
-  return method == SolverMethod::sweeps ? 1 : dynamics::SolverOptions().substeps;
 }
 
 std::unique_ptr<StepSolver> make_solver(const TestBedSolverOptions& options) {

@@ -47,6 +47,9 @@ struct SimulatorOptions : SimulationOptions {
   TestBedSolverOptions solver;  ///< in place of the library's
 };
 
+/// Returns the library's options, whose solver is the soft one for sweeps.
+SimulationOptions options_of(const SimulatorOptions& options);
+
 /// The solver of a method.
 std::unique_ptr<StepSolver> make_solver(const TestBedSolverOptions& options);
 

@@ -1,6 +1,5 @@
 #pragma once
-#include "kernels/manifold/half_spaces.h"
-#include "kernels/manifold/overlap_lines.h"
+#include "kernels/manifold/search_memory.h"
 
 /// The search for the line along a patch's normal on which two bodies overlap most.
 ///
@@ -22,9 +21,6 @@
 /// are forgotten, and the search goes on in a square around the best line with what the lines around it met,
 /// nearer and nearer. So of other bodies too a deepest line is found, if not always the deepest one.
 namespace tandem::manifold {
-
-/// Lines go through so many points of an overlap at most.
-inline constexpr int kMostSeeds = 4;
 
 /// A line is the deepest if none is deeper by more than this part.
 inline constexpr double kDeepEnough = 1e-6;
@@ -56,51 +52,13 @@ inline constexpr int kMostSteps = 16;
 /// along an edge. That costs no more than this part of its depth.
 inline constexpr double kOffEdge = 1e-10;
 
-/// A line on which a triangle of a lies above one of b.
-struct OverlapLine {
-  std::uint32_t triangle[2] = {kNoIndex, kNoIndex};
-  Vector2 at;
-  double height[2] = {0, 0};  ///< of a, of b
-
-  TANDEM_HD bool found() const { return triangle[0] != kNoIndex && triangle[1] != kNoIndex; }
-  TANDEM_HD double depth() const { return height[0] - height[1]; }
-};
-
-/// Points of the overlap, and pieces beside which they are.
-struct Seeds {
-  Vector3 at[kMostSeeds];
-  std::uint32_t beside[kMostSeeds];
-  int count;
-};
-
-/// The memory that a team shares while it looks for the deepest line.
-struct SearchMemory {
-  Seeds seeds;
-  int from;  ///< the seed from which the best line is seen
-  PatchFrame frame;
-  LineMemory lines;
-  HalfSpace learnt[4];  ///< by the lines of a step
-  HalfSpaces spaces;
-  LineOfTwo proposed;
-  OverlapLine best;
-  bool is_loose;  ///< the bodies reach the heights of the best line, at least
-  int steps;
-  double enough;  ///< as it was last seen
-};
-
 /// Looks for the deepest line of the overlap that the pieces order[begin] to order[end - 1] bound.
 template <typename Team>
 class DeepestLine {
  public:
   TANDEM_HD DeepestLine(const Team& team, const BodyPair& bodies, const PieceMemory& memory,
-                        const PieceSummary& summary, std::uint32_t region, SearchMemory& shared)
-      : team_(team),
-        bodies_(bodies),
-        memory_(memory),
-        one_region_(summary.curves <= 1),
-        begin_(memory.start[region]),
-        end_(memory.start[region + 1]),
-        shared_(shared) {}
+                        const PieceSummary& summary, SearchMemory& shared)
+      : team_(team), bodies_(bodies), memory_(memory), one_region_(summary.curves <= 1), shared_(shared) {}
 
   /// Finds places on the curve that lie far from each other: the nearest to the middle, the furthest from
   /// that, and the furthest off the line of these on either side. wanted: 4 at most.
@@ -175,7 +133,6 @@ class DeepestLine {
 
   bool one_region_;
   bool not_convex_ = false;  ///< a body goes on beyond a half-space
-  std::uint32_t begin_, end_;
   SearchMemory& shared_;
 };
 

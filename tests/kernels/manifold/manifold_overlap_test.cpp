@@ -30,13 +30,11 @@ Mesh small_cow() {
 }
 
 const std::vector<Body>& bodies() {
-  static const std::vector<Body> all = {{"box", box(1, 0.75f, 0.5f)},
-                                        {"thin_box", box(1, 1, 0.02f)},
-                                        {"ring", ring(24, 0.5, 10, 0.15)},
-                                        {"thin_ring", ring(24, 0.5, 8, 0.04)},
-                                        {"pipe", pipe(24, 0.3, 0.5, 0.5f)},
-                                        {"cup", cup(24, 0.5f, 0.6f, 0.08f)},
-                                        {"cow", small_cow(), 0.08}};
+  static const std::vector<Body> all = {
+      {"box", box(1, 0.75f, 0.5f)},       {"thin_box", box(1, 1, 0.02f)},
+      {"ring", ring(24, 0.5, 10, 0.15)},  {"thin_ring", ring(24, 0.5, 8, 0.04)},
+      {"pipe", pipe(24, 0.3, 0.5, 0.5f)}, {"cup", cup(24, 0.5f, 0.6f, 0.08f)},
+      {"cow", small_cow(), 0.08}};
   return all;
 }
 

@@ -557,7 +557,9 @@ TANDEM_HD void DeepestLine<Team>::begin_anew(double radius) {
 /// half-spaces prove.
 template <typename Team>
 TANDEM_HD void DeepestLine<Team>::look_beside(double reach, const double& enough) {
-  for (double radius = kFirstRing * reach; radius > kLastRing * reach && !is_deep_enough();) {
+  // A small curve may be where a large overlap ends.
+  const double size = greater(reach, shared_.best.depth());
+  for (double radius = kFirstRing * size; radius > kLastRing * size && !is_deep_enough();) {
     const double depth = shared_.best.depth();
     ask_beside(radius);
     take_seed_within();

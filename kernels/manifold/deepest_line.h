@@ -1,6 +1,5 @@
 #pragma once
-#include "kernels/manifold/half_spaces.h"
-#include "kernels/manifold/overlap_lines.h"
+#include "kernels/manifold/search_memory.h"
 
 /// The search for the line along a patch's normal on which two bodies overlap most.
 ///
@@ -15,22 +14,35 @@
 /// where its body ends: in a convex one, all points lie behind it. The line on which such half-spaces leave
 /// the bodies the most overlap is looked at next. If it counts and is as deep as they allow, then of convex
 /// bodies no line is deeper; else what it meets adds half-spaces, and the search goes on. A body that goes
-/// on beyond a half-space is not convex there: then that one is forgotten. So of other bodies too a deepest
-/// line is found, if not always the deepest one.
+/// on beyond a half-space is not convex there: then that one is forgotten.
+///
+/// What the half-spaces prove of convex bodies may be wrong of others: where two planes meet in a valley, a
+/// body lies beyond either. So then lines around the best one are looked at. If they refute a half-space, all
+/// are forgotten, and the search goes on in a square around the best line with what the lines around it met,
+/// nearer and nearer. So of other bodies too a deepest line is found, if not always the deepest one.
 namespace tandem::manifold {
-
-/// Lines go through so many points of an overlap at most.
-inline constexpr int kMostSeeds = 4;
 
 /// A line is the deepest if none is deeper by more than this part.
 inline constexpr double kDeepEnough = 1e-6;
 
-/// If the deepest line through the first points is deeper than this part of the patch's reach, the overlap is
-/// no flat one, and may have several places where it is deep. Lines go through more points then.
+/// An overlap that is deeper than this part of the patch's reach is no flat one.
 inline constexpr double kNotFlat = 0.1;
 
+/// If the deepest line is deeper than this part of the patch's reach, and a body not convex, lines around it
+/// are looked at, whatever the half-spaces prove.
+inline constexpr double kLooksBeside = 0.15;
+
+/// These lines lie on a ring whose radius is first kFirstRing times the patch's reach and becomes kNextRing
+/// times as large, down to kLastRing times the reach, as soon as the depth grows by no more than the part
+/// kRingGain.
+inline constexpr double kFirstRing = 0.5, kNextRing = 0.25, kLastRing = 0.03, kRingGain = 1e-3;
+
+/// The search looks at no more lines than this between two rings.
+inline constexpr int kStepsOfRing = 6;
+
 /// A patch whose curve is longer than its reach by this factor winds, as a thread does: the curve around a
-/// convex flat one is 2 pi times as long at most. It may have several such places too.
+/// convex flat one is 2 pi times as long at most. It may have several places where it is deep, even if it is
+/// flat, so lines around the deepest one are looked at too.
 inline constexpr double kWinds = 8;
 
 /// The search looks at no more lines than this, beside those through the first points.
@@ -40,51 +52,13 @@ inline constexpr int kMostSteps = 16;
 /// along an edge. That costs no more than this part of its depth.
 inline constexpr double kOffEdge = 1e-10;
 
-/// A line on which a triangle of a lies above one of b.
-struct OverlapLine {
-  std::uint32_t triangle[2] = {kNoIndex, kNoIndex};
-  Vector2 at;
-  double height[2] = {0, 0};  ///< of a, of b
-
-  TANDEM_HD bool found() const { return triangle[0] != kNoIndex && triangle[1] != kNoIndex; }
-  TANDEM_HD double depth() const { return height[0] - height[1]; }
-};
-
-/// Points of the overlap, and pieces beside which they are.
-struct Seeds {
-  Vector3 at[kMostSeeds];
-  std::uint32_t beside[kMostSeeds];
-  int count;
-};
-
-/// The memory that a team shares while it looks for the deepest line.
-struct SearchMemory {
-  Seeds seeds;
-  int from;  ///< the seed that is on the deepest of their lines
-  PatchFrame frame;
-  LineMemory lines;
-  HalfSpace learnt[4];  ///< by the lines of a step
-  HalfSpaces spaces;
-  LineOfTwo proposed;
-  OverlapLine best;
-  bool is_loose;  ///< the bodies reach the heights of the best line, at least
-  int steps;
-  double enough;  ///< as it was last seen
-};
-
 /// Looks for the deepest line of the overlap that the pieces order[begin] to order[end - 1] bound.
 template <typename Team>
 class DeepestLine {
  public:
   TANDEM_HD DeepestLine(const Team& team, const BodyPair& bodies, const PieceMemory& memory,
-                        const PieceSummary& summary, std::uint32_t region, SearchMemory& shared)
-      : team_(team),
-        bodies_(bodies),
-        memory_(memory),
-        one_region_(summary.curves <= 1),
-        begin_(memory.start[region]),
-        end_(memory.start[region + 1]),
-        shared_(shared) {}
+                        const PieceSummary& summary, SearchMemory& shared)
+      : team_(team), bodies_(bodies), memory_(memory), one_region_(summary.curves <= 1), shared_(shared) {}
 
   /// Finds places on the curve that lie far from each other: the nearest to the middle, the furthest from
   /// that, and the furthest off the line of these on either side. wanted: 4 at most.
@@ -115,25 +89,29 @@ class DeepestLine {
   TANDEM_HD void begin_with_seeds(const PatchFrame& frame, double reach);
 
   /// Finds shared.best; none where the bodies do not overlap along the normal. middle, reach: a ball around
-  /// the pieces. If there are several regions, the line goes through it. winds: the overlap may have several
-  /// places where it is deep, even if it is flat. The search ends as soon as a line is as deep as `enough`,
-  /// which others may lower meanwhile.
+  /// the pieces. If there are several regions, the line goes through it. winds: the patch winds (kWinds). The
+  /// search ends as soon as a line is as deep as `enough`, which others may lower meanwhile.
   TANDEM_HD void find(const PatchFrame& frame, const Vector3& middle, double reach, bool winds,
                       const double& enough);
 
  private:
-  template <typename PointAt>
-  TANDEM_HD int follow_lines_through(const PointAt& point_at, int count, std::uint32_t wanted, double reach,
-                                     double& depth);
   TANDEM_HD void search_from_seeds(const double& enough);
   TANDEM_HD bool goes_on_elsewhere() const;
-  TANDEM_HD bool look_around(const Vector3& middle, double reach);
+  TANDEM_HD void ask_beside(double radius);
+  TANDEM_HD void take_seed_within();
+  TANDEM_HD bool refutes_half_spaces() const;
+  TANDEM_HD void begin_anew(double radius);
+  TANDEM_HD void look_beside(double reach, const double& enough);
   TANDEM_HD void begin_half_spaces(const Vector3& middle, double reach);
   TANDEM_HD void learn(int side, const Crossing& surface, HalfSpace& out) const;
   /// Forgets half-spaces beyond which the bodies go on, up to these heights on a line.
   TANDEM_HD void go_beyond(const Vector2& at, const double (&height)[2]) {
-    not_convex_ = shared_.spaces.drop_before(team_, at, height, 16 * bodies_.tolerance()) || not_convex_;
+    not_convex_ =
+        shared_.spaces.drop_before(team_, at, height, 16 * bodies_.tolerance(), beyond_rounding()) ||
+        not_convex_;
   }
+  /// Faces of float32 corners, which are not quite flat, go on beyond each other by less than this.
+  TANDEM_HD double beyond_rounding() const { return kNearEnd * bodies_.smaller_diagonal(); }
   TANDEM_HD void propose(int seed);
   /// Looks how deep is enough. It is called by one of the team.
   TANDEM_HD void see(const double& enough) { shared_.enough = *static_cast<const volatile double*>(&enough); }
@@ -144,15 +122,17 @@ class DeepestLine {
   TANDEM_HD OverlapLine line_that_counts(int from, bool& is_loose) const;
   TANDEM_HD bool learn_from_lines(int from);
   TANDEM_HD bool step(int from);
+  TANDEM_HD void improve(int seed, int most_steps, const double& enough);
 
   const Team& team_;
   const BodyPair& bodies_;
   const PieceMemory& memory_;
-  static constexpr int kLines = 4;  ///< of a step: along the proposed line, and straight to its ends
+  static constexpr int kLines = 4;           ///< of a step: along the proposed line, and straight to its ends
+  static constexpr int kBeside = 8;          ///< lines around the best one
+  static constexpr std::uint32_t kRing = 2;  ///< the first of their questions
 
   bool one_region_;
   bool not_convex_ = false;  ///< a body goes on beyond a half-space
-  std::uint32_t begin_, end_;
   SearchMemory& shared_;
 };
 
@@ -199,56 +179,35 @@ TANDEM_HD void DeepestLine<Team>::go_inside(Seeds& seeds, std::uint32_t asked) {
   team_.sync();
 }
 
-/// Follows the lines along the normal through points of the overlap, those of `count` that have a bit,
-/// LineMemory::kMost / 2 at most. Result: the point on whose line the bodies overlap most, -1 if they overlap
-/// on none. depth: how much that is.
-template <typename Team>
-template <typename PointAt>
-TANDEM_HD int DeepestLine<Team>::follow_lines_through(const PointAt& point_at, int count,
-                                                      std::uint32_t wanted, double reach, double& depth) {
-  LineQuestion* const line = shared_.lines.line;
-  LineQuestions questions(bodies_, line);
-  team_.sync();  // all have read the answers before
-  for (int i = static_cast<int>(team_.rank()); i < 2 * count; i += static_cast<int>(team_.size())) {
-    const int side = i % 2;
-    const Vector3 point = point_at(i / 2);
-    const double from = shared_.frame.height(point);
-    questions.ask(static_cast<std::uint32_t>(i), shared_.frame, side, side == 0 ? 1 : -1,
-                  shared_.frame.flat(point), from, side == 0 ? from : -INFINITY, side == 0 ? INFINITY : from,
-                  reach, kGrazes);
-    if ((wanted >> i / 2 & 1u) == 0) line[i].side = -1;
-  }
-  team_.sync();
-  if (wanted != 0) walk_lines(team_, questions, 2 * static_cast<std::uint32_t>(count));
-  int deepest = -1;
-  depth = 0;
-  TANDEM_ROLLED
-  for (int i = 0; i < count; ++i) {
-    if ((wanted >> i & 1u) == 0) continue;
-    const Crossing &top = line[2 * i].best, &bottom = line[2 * i + 1].best;
-    if (top.found() && bottom.found() && top.height - bottom.height > depth)
-      depth = top.height - bottom.height, deepest = i;
-  }
-  return deepest;
-}
-
 template <typename Team>
 TANDEM_HD void DeepestLine<Team>::begin_with_seeds(const PatchFrame& frame, double reach) {
   team_.sync();
   if (team_.rank() == 0) shared_.frame = frame;
   team_.sync();
-  double depth;
+  LineQuestion* const line = shared_.lines.line;
+  LineQuestions questions(bodies_, line);
   const int count = shared_.seeds.count;
-  const int from = follow_lines_through([&](int i) { return shared_.seeds.at[i]; }, count, (1u << count) - 1,
-                                        reach, depth);
+  for (int i = static_cast<int>(team_.rank()); i < 2 * count; i += static_cast<int>(team_.size())) {
+    const int side = i % 2;
+    const Vector3& point = shared_.seeds.at[i / 2];
+    const double from = shared_.frame.height(point);
+    questions.ask(static_cast<std::uint32_t>(i), shared_.frame, side, side == 0 ? 1 : -1,
+                  shared_.frame.flat(point), from, side == 0 ? from : -INFINITY, side == 0 ? INFINITY : from,
+                  reach, kGrazes);
+  }
+  team_.sync();
+  walk_lines(team_, questions, 2 * static_cast<std::uint32_t>(count));
   if (team_.rank() == 0) {
     shared_.best = {};
     shared_.is_loose = false;
-    if (from >= 0) {
-      const LineQuestion &top = shared_.lines.line[2 * from], &bottom = shared_.lines.line[2 * from + 1];
+    TANDEM_ROLLED
+    for (int i = 0; i < count; ++i) {
+      const LineQuestion &top = line[2 * i], &bottom = line[2 * i + 1];
+      if (!top.best.found() || !bottom.best.found()) continue;
+      if (!(top.best.height - bottom.best.height > shared_.best.depth())) continue;
       shared_.best = {
           {top.best.triangle, bottom.best.triangle}, top.at, {top.best.height, bottom.best.height}};
-      shared_.from = from;
+      shared_.from = i;
     }
   }
   team_.sync();
@@ -269,53 +228,6 @@ TANDEM_HD bool DeepestLine<Team>::goes_on_elsewhere() const {
                                                    kNearEnd * shape.diagonal);
   }
   return team_.any(goes_on);
-}
-
-/// Follows the lines through more points of the overlap: those between the outermost places of the curve and
-/// what is opposite within both bodies. True if one is deeper than the best line: its point becomes a seed.
-template <typename Team>
-TANDEM_HD bool DeepestLine<Team>::look_around(const Vector3& middle, double reach) {
-  constexpr int kPlaces = 8, kPoints = 2;
-  const OverlapLines<Team> lines(team_, bodies_, memory_, shared_.lines);
-  const CurvePlaces<Team> places(team_, memory_);
-  const Vector3 n = shared_.frame.n;
-  Vector3 along =
-      places
-          .furthest_place(begin_, end_, reach, [&](const Vector3& x) { return dot(x - middle, x - middle); })
-          .at -
-      middle;
-  along = along - dot(along, n) * n;
-  const Vector3 across = cross(n, along);
-  // Eighths of a turn.
-  const auto step = [](int i) { return i % 4 == 2 ? 0.0 : (i + 2) % kPlaces < 4 ? 1.0 : -1.0; };
-  places.template furthest_places<kPlaces>(
-      begin_, end_, reach,
-      [&](int i, const Vector3& x) {
-        return dot(x - middle, step(i) * along + step((i + 6) % kPlaces) * across);
-      },
-      shared_.lines.place);
-  const double most = greater(bodies_.a.shape->diagonal, bodies_.b.shape->diagonal);
-  const std::uint32_t found = lines.go_inside(kPlaces, most);
-  double most_depth = shared_.best.depth();
-  int best = -1, part = 0;
-  const Place* const place = shared_.lines.place;
-  const Vector3* const inside = shared_.lines.inside;
-  const auto point = [&](int i, int k) { return place[i].at + (0.4 + 0.8 * k) * (inside[i] - place[i].at); };
-  TANDEM_ROLLED
-  for (int k = 0; k < kPoints; ++k) {
-    double depth;
-    const int here = follow_lines_through([&](int i) { return point(i, k); }, kPlaces, found, reach, depth);
-    if (here >= 0 && depth > most_depth) most_depth = depth, best = here, part = k;
-  }
-  team_.sync();  // all have read the best line
-  if (team_.rank() == 0 && best >= 0) {
-    Seeds& seeds = shared_.seeds;
-    int at = shared_.from == kMostSeeds - 1 ? kMostSeeds - 2 : kMostSeeds - 1;
-    if (seeds.count < kMostSeeds) at = seeds.count++;
-    seeds.at[at] = point(best, part), seeds.beside[at] = place[best].piece;
-  }
-  team_.sync();
-  return best >= 0;
 }
 
 /// Finds the half-space of a triangle that a line met; none if there is no triangle.
@@ -484,7 +396,7 @@ TANDEM_HD bool DeepestLine<Team>::step(int from) {
   if (next.found()) go_beyond(next.at, next.height);
   const bool learns = learn_from_lines(from);
   if (team_.rank() == 0) {
-    if (next.found()) shared_.best = next, shared_.is_loose = is_loose;
+    if (next.found()) shared_.best = next, shared_.is_loose = is_loose, shared_.from = from;
     ++shared_.steps;
   }
   team_.sync();
@@ -517,22 +429,146 @@ TANDEM_HD void DeepestLine<Team>::go_to_ends() {
   team_.sync();
 }
 
+/// Looks at the lines that are proposed one after the other, as seen from a seed.
+template <typename Team>
+TANDEM_HD void DeepestLine<Team>::improve(int seed, int most_steps, const double& enough) {
+  const Vector3& from = shared_.seeds.at[seed];
+  shared_.spaces.look_from(team_, shared_.frame.flat(from), shared_.frame.height(from));
+  do {
+    propose(seed);
+    if (team_.rank() == 0) see(enough);
+    team_.sync();
+  } while (shared_.proposed.found && shared_.steps < most_steps && !is_deep_enough() && step(seed));
+}
+
 /// Improves the best of the lines through the seeds.
 template <typename Team>
 TANDEM_HD void DeepestLine<Team>::search_from_seeds(const double& enough) {
   const int deepest = shared_.from;
   for (int i = 0; i < shared_.seeds.count && !is_deep_enough(); ++i) {
     const int seed = i == 0 ? deepest : i <= deepest ? i - 1 : i;
-    const Vector2 at = shared_.frame.flat(shared_.seeds.at[seed]);
-    const double height = shared_.frame.height(shared_.seeds.at[seed]);
+    const Vector3& from = shared_.seeds.at[seed];
     // Where faces of both bodies lie in each other, it may be no point within them.
-    if (shared_.spaces.in_plane(team_, at, height, 16 * bodies_.tolerance())) continue;
-    shared_.spaces.look_from(team_, at, height);
-    do {
-      propose(seed);
-      if (team_.rank() == 0) see(enough);
-      team_.sync();
-    } while (shared_.proposed.found && shared_.steps < kMostSteps && !is_deep_enough() && step(seed));
+    if (shared_.spaces.in_plane(team_, shared_.frame.flat(from), shared_.frame.height(from),
+                                16 * bodies_.tolerance()))
+      continue;
+    improve(seed, kMostSteps, enough);
+  }
+}
+
+/// Asks for both surfaces on lines around the best one, above and below its middle, and whether the middle is
+/// a point of the overlap: whether a straight line from the seed leads there.
+template <typename Team>
+TANDEM_HD void DeepestLine<Team>::ask_beside(double radius) {
+  const OverlapLine& best = shared_.best;
+  const Vector2 along = shared_.spaces.along();
+  const double middle = (best.height[0] + best.height[1]) / 2;
+  const Vector3 within = shared_.frame.at(best.at, middle);
+  LineQuestions questions(bodies_, shared_.lines.line);
+  team_.sync();  // all have read the answers before
+  OverlapLines<Team>(team_, bodies_, memory_, shared_.lines)
+      .ask_straight(0, shared_.seeds.at[shared_.from], {within, within});
+  for (std::uint32_t i = team_.rank(); i < 2 * kBeside; i += team_.size()) {
+    const std::uint32_t eighth = i / 2 % 4;  // of a turn; the other four lie opposite
+    const double diagonal = eighth % 2 != 0 ? 0.7071067811865476 : 1;
+    const double c = eighth == 2 ? 0 : diagonal, s = eighth == 0 ? 0 : eighth == 3 ? -diagonal : diagonal;
+    const double r = (i / 2 < 4 ? 1 : -1) * (eighth % 2 != 0 ? radius / 2 : radius);
+    const Vector2 at = best.at + r * Vector2{c * along.x - s * along.y, c * along.y + s * along.x};
+    const bool of_a = i % 2 == 0;
+    questions.ask(kRing + i, shared_.frame, of_a ? 0 : 1, of_a ? 1 : -1, at, middle,
+                  of_a ? middle : -INFINITY, of_a ? INFINITY : middle, best.depth(), kGrazes);
+  }
+  team_.sync();
+  walk_lines(team_, questions, kRing + 2 * kBeside);
+}
+
+/// If the middle of the best line is a point of the overlap, it becomes the seed: more lines are seen from
+/// there.
+template <typename Team>
+TANDEM_HD void DeepestLine<Team>::take_seed_within() {
+  const LineQuestion* const line = shared_.lines.line;
+  if (team_.rank() == 0 && !line[0].best.found() && !line[1].best.found()) {
+    const OverlapLine& best = shared_.best;
+    shared_.seeds.at[shared_.from] = shared_.frame.at(best.at, (best.height[0] + best.height[1]) / 2);
+  }
+  team_.sync();
+}
+
+/// Returns whether a line around the best one is deeper, or a body goes on there beyond a half-space that
+/// counts. The deepest of them is proposed if it is deeper.
+template <typename Team>
+TANDEM_HD bool DeepestLine<Team>::refutes_half_spaces() const {
+  const LineQuestion* const line = shared_.lines.line + kRing;
+  const auto overlaps = [&](int i) { return line[2 * i].best.found() && line[2 * i + 1].best.found(); };
+  double depth = shared_.best.depth() * (1 + kDeepEnough);
+  int deepest = -1;
+  TANDEM_ROLLED
+  for (int i = 0; i < kBeside; ++i) {
+    if (!overlaps(i) || !(line[2 * i].best.height - line[2 * i + 1].best.height > depth)) continue;
+    depth = line[2 * i].best.height - line[2 * i + 1].best.height, deepest = i;
+  }
+  bool goes_on = false;
+  TANDEM_ROLLED
+  for (int i = static_cast<int>(team_.rank()); i < 2 * kBeside; i += static_cast<int>(team_.size())) {
+    goes_on = goes_on || (overlaps(i / 2) && shared_.spaces.any_that_counts_before(
+                                                 i % 2, line[i].at, line[i].best.height, beyond_rounding()));
+  }
+  if (team_.rank() == 0) {
+    shared_.proposed.found = deepest >= 0;
+    if (deepest >= 0) {
+      const LineQuestion &top = line[2 * deepest], &bottom = line[2 * deepest + 1];
+      shared_.proposed = {top.at, {top.best.height, bottom.best.height}, true};
+    }
+  }
+  const bool refutes = team_.any(goes_on) || deepest >= 0;
+  team_.sync();  // all have read the half-spaces
+  return refutes;
+}
+
+/// Begins anew, in a square around the best line, with the half-spaces of what that and the lines around it
+/// met.
+template <typename Team>
+TANDEM_HD void DeepestLine<Team>::begin_anew(double radius) {
+  const LineQuestion* const line = shared_.lines.line + kRing;
+  if (team_.rank() == 0) {
+    shared_.steps = 0;
+    shared_.spaces.look_near(shared_.best.at, 1.5 * radius);
+  }
+  static_assert(2 * kBeside + 2 <= HalfSpaces::kMost);
+  TANDEM_ROLLED
+  for (int i = static_cast<int>(team_.rank()); i < HalfSpaces::kMost; i += static_cast<int>(team_.size())) {
+    HalfSpace& space = shared_.spaces.space[i];
+    Crossing met;
+    if (i < 2 * kBeside) met = line[i].best;
+    if (i / 2 == kBeside) met.triangle = shared_.best.triangle[i % 2];
+    learn(i % 2, met, space);
+    space.counts = false;
+  }
+  team_.sync();
+  go_beyond(shared_.best.at, shared_.best.height);
+  TANDEM_ROLLED
+  for (int i = 0; i < kBeside; ++i) {
+    const LineQuestion &top = line[2 * i], &bottom = line[2 * i + 1];
+    if (top.best.found() && bottom.best.found()) go_beyond(top.at, {top.best.height, bottom.best.height});
+  }
+}
+
+/// Looks at lines around the best one, nearer and nearer, and goes on from there if they refute what the
+/// half-spaces prove.
+template <typename Team>
+TANDEM_HD void DeepestLine<Team>::look_beside(double reach, const double& enough) {
+  // A small curve may be where a large overlap ends.
+  const double size = greater(reach, shared_.best.depth());
+  for (double radius = kFirstRing * size; radius > kLastRing * size && !is_deep_enough();) {
+    const double depth = shared_.best.depth();
+    ask_beside(radius);
+    take_seed_within();
+    if (refutes_half_spaces()) {
+      begin_anew(radius);
+      if (shared_.proposed.found) step(shared_.from);
+      improve(shared_.from, kStepsOfRing, enough);
+    }
+    if (!(shared_.best.depth() > depth * (1 + kRingGain))) radius *= kNextRing;
   }
 }
 
@@ -540,14 +576,12 @@ template <typename Team>
 TANDEM_HD void DeepestLine<Team>::find(const PatchFrame& frame, const Vector3& middle, double reach,
                                        bool winds, const double& enough) {
   if (team_.rank() == 0) see(enough);
-  for (bool again = true, looked = false; again; looked = true) {
-    begin_with_seeds(frame, reach);
-    if (!shared_.best.found() || (!looked && is_deep_enough())) return;
-    begin_half_spaces(middle, reach);
-    again = !looked && (winds || shared_.best.depth() > kNotFlat * reach) &&
-            (not_convex_ || goes_on_elsewhere()) && look_around(middle, reach);
-  }
+  begin_with_seeds(frame, reach);
+  if (!shared_.best.found() || is_deep_enough()) return;
+  begin_half_spaces(middle, reach);
   search_from_seeds(enough);
+  if ((winds || shared_.best.depth() > kLooksBeside * reach) && (not_convex_ || goes_on_elsewhere()))
+    look_beside(reach, enough);
   go_to_ends();
 }
 

@@ -47,6 +47,14 @@ class HalfSpaces {
     begin_basis();
   }
 
+  /// One of the team moves the square's middle to a line. half: half the length of its sides.
+  TANDEM_HD void look_near(const Vector2& middle, double half) {
+    for (int i = 0; i < 4; ++i) wall_[i] = dot(wall(i), middle) + half;
+    begin_basis();
+  }
+  /// A unit vector along two sides of the square.
+  TANDEM_HD const Vector2& along() const { return along_; }
+
   /// Returns which of some half-spaces are known, a bit for each.
   template <typename Team, int kCount>
   TANDEM_HD unsigned known(const Team& team, const HalfSpace (&wanted)[kCount]) const {
@@ -72,16 +80,17 @@ class HalfSpaces {
     if (drops && team.rank() == 0) begin_basis();
     team.sync();
   }
-  /// Forgets those beyond which the body goes on. Result: whether there are any.
+  /// Forgets those beyond which the body goes on. Result: whether it does so by more than `much` anywhere.
   template <typename Team>
-  TANDEM_HD bool drop_before(const Team& team, const Vector2& at, const double (&height)[2],
-                             double tolerance) {
+  TANDEM_HD bool drop_before(const Team& team, const Vector2& at, const double (&height)[2], double tolerance,
+                             double much) {
     bool drops = false, any = false;
     for (int i = first_of(team); i < kMost; i += step_of(team)) {
       HalfSpace& of = space[i];
-      if (of.triangle == kNoIndex || !(of.beyond(at, of.side == 0 ? height[0] : height[1]) > tolerance))
-        continue;
-      drops = drops || basis_.has(kWalls + i), any = true;
+      if (of.triangle == kNoIndex) continue;
+      const double beyond = of.beyond(at, of.side == 0 ? height[0] : height[1]);
+      if (!(beyond > tolerance)) continue;
+      drops = drops || basis_.has(kWalls + i), any = any || beyond > much;
       of.triangle = kNoIndex, of.counts = false;
     }
     drops = team.any(drops);
@@ -121,6 +130,14 @@ class HalfSpaces {
     for (int i = 0; i < kMost; ++i)
       is = is || (space[i].triangle != kNoIndex && space[i].side == side &&
                   space[i].beyond(at, height) > tolerance);
+    return is;
+  }
+  /// Returns the same of those that count.
+  TANDEM_HD bool any_that_counts_before(int side, const Vector2& at, double height, double tolerance) const {
+    bool is = false;
+    TANDEM_ROLLED
+    for (int i = 0; i < kMost; ++i)
+      is = is || (space[i].counts && space[i].side == side && space[i].beyond(at, height) > tolerance);
     return is;
   }
   /// Returns whether a line is on the square's border.

@@ -398,7 +398,7 @@ __global__ void __launch_bounds__(kThreads, 4) sound_patches(const __grid_consta
     if (!begun.is_deep && begun.state.kind != manifold::PatchKind::overlap) return;
     with_maker(args, team, memory[own], begun.of, [&](auto& maker, PatchState& state) {
       copy_state(team, begun.state, state);
-      maker.sound(begun.of.curve, depth_search(args, row), searches[own].get());
+      maker.sound(depth_search(args, row), searches[own].get());
       if (!begun.is_deep) copy_state(team, state, begun.state);
     });
   });
@@ -426,8 +426,7 @@ __global__ void __launch_bounds__(kThreads, 3) measure_depths(const __grid_const
         direction >= search.directions)
       return;
     with_maker(args, team, memory[own], begun.of, [&](auto& maker, PatchState&) {
-      const manifold::OverlapLine line =
-          maker.line_along(begun.of.curve, search, direction, searches[own].get());
+      const manifold::OverlapLine line = maker.line_along(search, direction, searches[own].get());
       const bool through = !is_deep && begun.state.bent && line.found() &&
                            maker.goes_through(line, search, searches[own].get().lines);
       if (team.rank() != 0) return;

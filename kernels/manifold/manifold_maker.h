@@ -44,16 +44,14 @@ class ManifoldMaker {
 
   /// Finds the surfaces beside the points of the rim, and points of the overlap from which to look for the
   /// deepest line. Condition, here and below: the patch is an overlap, or deep.
-  TANDEM_HD void sound(std::uint32_t region, DepthSearch& search, SearchMemory& shared);
+  TANDEM_HD void sound(DepthSearch& search, SearchMemory& shared);
 
   /// Finds the deepest line along a direction. The search for it ends as soon as one is as deep as
   /// search.enough.
-  TANDEM_HD OverlapLine line_along(std::uint32_t region, const DepthSearch& search, int direction,
-                                   SearchMemory& shared) const;
+  TANDEM_HD OverlapLine line_along(const DepthSearch& search, int direction, SearchMemory& shared) const;
 
   /// Finds how deep the overlap is along a direction at least.
-  TANDEM_HD double least_depth_along(std::uint32_t region, const DepthSearch& search, int direction,
-                                     SearchMemory& shared) const;
+  TANDEM_HD double least_depth_along(const DepthSearch& search, int direction, SearchMemory& shared) const;
 
   /// Returns whether a line along the first direction leaves the overlap on its way.
   TANDEM_HD bool goes_through(const OverlapLine& line, const DepthSearch& search, LineMemory& lines) const;
@@ -211,9 +209,9 @@ TANDEM_HD void ManifoldMaker<Team>::outline(std::uint32_t region, OutlineMemory&
 }
 
 template <typename Team>
-TANDEM_HD void ManifoldMaker<Team>::sound(std::uint32_t region, DepthSearch& search, SearchMemory& shared) {
+TANDEM_HD void ManifoldMaker<Team>::sound(DepthSearch& search, SearchMemory& shared) {
   const bool has_rim = state_.kind == PatchKind::overlap;
-  DeepestLine<Team>(team_, bodies_, memory_, summary_, region, shared)
+  DeepestLine<Team>(team_, bodies_, memory_, summary_, shared)
       .go_inside(search.seeds, has_rim ? ask_at_rim(shared.lines) : 0);
   if (!has_rim) return;
   take_rim(shared.lines);
@@ -221,9 +219,9 @@ TANDEM_HD void ManifoldMaker<Team>::sound(std::uint32_t region, DepthSearch& sea
 }
 
 template <typename Team>
-TANDEM_HD OverlapLine ManifoldMaker<Team>::line_along(std::uint32_t region, const DepthSearch& search,
-                                                      int direction, SearchMemory& shared) const {
-  DeepestLine<Team> line(team_, bodies_, memory_, summary_, region, shared);
+TANDEM_HD OverlapLine ManifoldMaker<Team>::line_along(const DepthSearch& search, int direction,
+                                                      SearchMemory& shared) const {
+  DeepestLine<Team> line(team_, bodies_, memory_, summary_, shared);
   line.begin(search.seeds);
   line.find(PatchFrame(summary_.origin, search.along(direction)), search.middle, search.reach,
             search.measure.length > kWinds * search.reach, search.enough);
@@ -231,9 +229,9 @@ TANDEM_HD OverlapLine ManifoldMaker<Team>::line_along(std::uint32_t region, cons
 }
 
 template <typename Team>
-TANDEM_HD double ManifoldMaker<Team>::least_depth_along(std::uint32_t region, const DepthSearch& search,
-                                                        int direction, SearchMemory& shared) const {
-  DeepestLine<Team> line(team_, bodies_, memory_, summary_, region, shared);
+TANDEM_HD double ManifoldMaker<Team>::least_depth_along(const DepthSearch& search, int direction,
+                                                        SearchMemory& shared) const {
+  DeepestLine<Team> line(team_, bodies_, memory_, summary_, shared);
   line.begin(search.seeds);
   line.begin_with_seeds(PatchFrame(summary_.origin, search.along(direction)), search.reach);
   const OverlapLine best = line.best();
@@ -281,16 +279,16 @@ TANDEM_HD void ManifoldMaker<Team>::measure(std::uint32_t region, DepthSearch& s
                                             SearchMemory& depths) {
   outline(region, shared, search);
   if (state_.kind != PatchKind::overlap && state_.kind != PatchKind::deep) return;
-  sound(region, search, depths);
+  sound(search, depths);
   if (state_.kind == PatchKind::overlap) {
-    const OverlapLine line = line_along(region, search, 0, depths);
+    const OverlapLine line = line_along(search, 0, depths);
     const bool through = state_.bent && line.found() && goes_through(line, search, depths.lines);
     return take_deepest(line, through, bodies_, state_);
   }
   DeepLines found;
   // The directions along which the first lines are shallowest come first; of others little more is looked at.
   double known[2 * kMostTried];
-  for (int i = 0; i < search.directions; ++i) known[i] = least_depth_along(region, search, i, depths);
+  for (int i = 0; i < search.directions; ++i) known[i] = least_depth_along(search, i, depths);
   for (;;) {
     int next = -1;
     for (int i = 0; i < search.directions; ++i) {
@@ -298,7 +296,7 @@ TANDEM_HD void ManifoldMaker<Team>::measure(std::uint32_t region, DepthSearch& s
     }
     if (next < 0) break;  // none of the others is shallower
     known[next] = -1;
-    found.along[next] = line_along(region, search, next, depths);
+    found.along[next] = line_along(search, next, depths);
     search.enough = lesser(search.enough, enough_for_others(found.along[next]));
   }
   end_deep(region, search, found, shared, depths.lines);

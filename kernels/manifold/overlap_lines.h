@@ -50,23 +50,6 @@ class CurvePlaces {
     ends_of(memory_.pieces[piece[0]], reach, p, q);
     return {value(p) >= value(q) ? p : q, piece[0]};
   }
-  /// Finds those that have most of several such functions: value(i, x). out: what all of the team see.
-  template <int kCount, typename Value>
-  TANDEM_HD void furthest_places(std::uint32_t begin, std::uint32_t end, double reach, const Value& value,
-                                 Place* out) const {
-    std::uint32_t piece[kCount];
-    least_pieces(begin, end, piece, [&](const Piece& of, double(&least)[kCount]) {
-      Vector3 p, q;
-      ends_of(of, reach, p, q);
-      for (int i = 0; i < kCount; ++i) least[i] = -greater(value(i, p), value(i, q));
-    });
-    for (int i = static_cast<int>(team_.rank()); i < kCount; i += static_cast<int>(team_.size())) {
-      Vector3 p, q;
-      ends_of(memory_.pieces[piece[i]], reach, p, q);
-      out[i] = {value(i, p) >= value(i, q) ? p : q, piece[i]};
-    }
-    team_.sync();
-  }
   /// Returns the point of a piece that is nearest to another one and not too near to its ends.
   TANDEM_HD static Vector3 nearest_on(const Piece& piece, const Vector3& from, double off_end);
 

@@ -8,7 +8,8 @@ namespace {
 
 JointedBody jointed_body(const IslandProblem& problem, const StepInput& input, std::uint32_t body,
                          std::uint32_t place) {
-  return {body, input.bodies.data(), problem.states.data(), place > 0 ? &problem.stepped[place].scale : nullptr};
+  return {body, input.bodies.data(), problem.states.data(),
+          place > 0 ? &problem.stepped[place].scale : nullptr};
 }
 
 JointGeometry geometry_at_start(const IslandProblem& problem, const StepInput& input, std::uint32_t joint) {

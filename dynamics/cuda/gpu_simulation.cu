@@ -45,8 +45,7 @@ GpuSimulation::GpuSimulation(std::span<const AssetView> assets, std::span<const 
   parts.check(parts.filter.upload(filter, bodies.size(), parts.on_gpu.executor));
   parts.check(parts.filter.exclude(filter.excluded, parts.on_gpu.executor));
   parts.on_gpu.questions.set_filter(parts.filter.view());
-  if (is_continuous)
-    parts.continuous = std::make_unique<ContinuousMotion>(assets, options.threads, &filter);
+  if (is_continuous) parts.continuous = std::make_unique<ContinuousMotion>(assets, options.threads, &filter);
   parts.check(parts.on_gpu.set_bodies(
       bodies, states, {}, {options.gravity, options.solver, options.sleep, parts.continuous.get()}));
 }
@@ -74,7 +73,8 @@ StepRecord GpuSimulation::step() {
   record.open_curves = manifolds.open_curves;
   parts.read_states();
   parts.check(parts.on_gpu.executor.copy(parts.simulation().arrays().group, std::span(parts.groups)));
-  record.sleeping = parts.groups.size() - static_cast<std::size_t>(std::ranges::count(parts.groups, Sleep::kAwake));
+  record.sleeping =
+      parts.groups.size() - static_cast<std::size_t>(std::ranges::count(parts.groups, Sleep::kAwake));
   measure(parts.bodies, parts.states, parts.options.gravity, record);
   return record;
 }

@@ -97,9 +97,8 @@ class Sweeper {
       const TaskMemory to = memory(k, contacts);
       copy(all_.rows.pairs + group, to.pairs, kGroupsOfTeam);
       copy(all_.turns + group, to.turns, kGroupsOfTeam);
-      copy_rows(task(k), contacts, [&](auto* there, auto* here, std::uint32_t count) {
-        copy(there, here, count);
-      });
+      copy_rows(task(k), contacts,
+                [&](auto* there, auto* here, std::uint32_t count) { copy(there, here, count); });
     }
     for_own_bodies([&](std::uint32_t i, Body& body) {
       body = {};
@@ -118,9 +117,8 @@ class Sweeper {
 
   TANDEM_HD void put_back() {
     for (std::uint32_t k = worker_.team; k < own_tasks(); k += worker_.teams)
-      copy_rows(task(k), contacts_of(all_, task(k)), [&](auto* there, auto* here, std::uint32_t count) {
-        copy(here, there, count);
-      });
+      copy_rows(task(k), contacts_of(all_, task(k)),
+                [&](auto* there, auto* here, std::uint32_t count) { copy(here, there, count); });
     for_own_bodies([&](std::uint32_t i, Body& body) {
       all_.velocities[i] = shared_of(body.velocity), all_.moved[i] = shared_of(body.moved);
     });
@@ -227,8 +225,8 @@ class Sweeper {
     const SoftPairs* const pairs = memory(k, 0).pairs;
     const SoftPairs& last = pairs[kGroupsOfTeam - 1];
     const TaskMemory here = memory(k, last.first + last.contacts);
-    const SoftRows rows = {nullptr,    nullptr,        here.pairs,         here.turnings, here.normals,
-                           here.gaps, here.frictions, all_.rows.inverse_h};
+    const SoftRows rows = {nullptr,      nullptr,   here.pairs,     here.turnings,
+                           here.normals, here.gaps, here.frictions, all_.rows.inverse_h};
     for (std::uint32_t lane = worker_.lane; lane < kGroupsOfTeam * kSoftWidth; lane += worker_.lanes)
       visit_lane(sweep, rows, here.turns, lane / kSoftWidth, static_cast<int>(lane % kSoftWidth));
   }
@@ -253,9 +251,8 @@ class Sweeper {
     }
     PairVisit<OneLane> pair(rows, group, lane);
     const MotionOf<OneLane> moved_lanes[2] = {lanes_of(moved[0]), lanes_of(moved[1])};
-    soft_sweeps_detail::visit(all_, sweep, pair, moved_lanes, [&] {
-      pair.begin(lanes_of(velocities[0]), lanes_of(velocities[1]));
-    });
+    soft_sweeps_detail::visit(all_, sweep, pair, moved_lanes,
+                              [&] { pair.begin(lanes_of(velocities[0]), lanes_of(velocities[1])); });
     if (at[0] != nullptr) hand_on(sweep, is_last[0], soft_sweeps_detail::motion_of(pair.a()), *at[0]);
     if (at[1] != nullptr) hand_on(sweep, is_last[1], soft_sweeps_detail::motion_of(pair.b()), *at[1]);
   }

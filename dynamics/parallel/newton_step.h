@@ -64,8 +64,8 @@ class ParallelNewtonStep {
   }
 
   std::size_t bytes() const {
-    return bytes_of(needs_, islands_, numbers_, of_bodies_, of_pairs_, is_solved_, is_pair_solved_, soft_pairs_,
-                    memory_);
+    return bytes_of(needs_, islands_, numbers_, of_bodies_, of_pairs_, is_solved_, is_pair_solved_,
+                    soft_pairs_, memory_);
   }
 
  private:

@@ -8,6 +8,7 @@
 
 #include "dynamics/parallel/newton_step.h"
 #include "dynamics/parallel/pair_step.h"
+#include "dynamics/parallel/parallel_arrays.h"
 #include "dynamics/parallel/parallel_joints.h"
 #include "dynamics/parallel/simulation_rows.h"
 #include "dynamics/parallel/sleep_step.h"
@@ -37,15 +38,6 @@ struct CountsGoOn {
 };
 
 }  // namespace parallel_simulation_detail
-
-/// What a parallel simulation is made of.
-struct ParallelBodies {
-  std::span<const BodyProperties> properties;
-  std::span<const BodyState> states;
-  std::span<const double> inner_radii;  ///< of each shape, see inner_radii()
-  std::span<const AssetBox> boxes;      ///< of each shape
-  std::span<const Joint> joints = {};
-};
 
 struct ParallelOptions {
   Vector3 gravity = {0, 0, -9.81};
@@ -83,19 +75,21 @@ class ParallelSimulation {
 
   /// Places all bodies anew. There are no contacts then.
   Status set_bodies(const ParallelBodies& bodies, const ParallelOptions& options) {
-    bodies_ = static_cast<std::uint32_t>(bodies.properties.size());
     options_ = options;
     thinnest_ = options.continuous != nullptr ? thinnest_of(bodies.properties, bodies.inner_radii) : INFINITY;
-    within_ = 0, has_forces_ = false, ++generation_;
-    most_pairs_ = most_moved_ = most_found_ = most_remembered_ = 0;
+    within_ = 0, arrays_.has_forces = false, ++generation_;
+    arrays_.most_pairs = arrays_.most_moved = arrays_.most_found = arrays_.most_remembered = 0;
+    const Status reserved = arrays_.reserve_bodies(to_, bodies);
+    if (reserved != Status::kOk) return reserved;
     records_count_ = remembered_count_ = 0;
     for (Status status :
-         {joints_.set(to_, bodies.joints, bodies.properties, bodies.states), reserve_bodies(bodies),
-          reserve_pairs(std::max(1024u, 8 * bodies_)), reserve_moved(std::max(256u, bodies_ / 2)),
-          reserve_contacts(std::max(4096u, 32 * bodies_), std::max(4096u, 32 * bodies_))}) {
+         {joints_.set(to_, bodies.joints, bodies.properties, bodies.states),
+          reserve_pairs(std::max(1024u, 8 * arrays_.bodies)),
+          arrays_.reserve_moved(to_, std::max(256u, arrays_.bodies / 2)),
+          reserve_contacts(std::max(4096u, 32 * arrays_.bodies), std::max(4096u, 32 * arrays_.bodies))}) {
       if (status != Status::kOk) return status;
     }
-    return put(counts_, StepCounts{});
+    return arrays_.put(to_, arrays_.counts, StepCounts{});
   }
 
   /// Makes a step. Result: kOutOfRange where a body has left the range of numbers, and bad_body() is the
@@ -116,7 +110,8 @@ class ParallelSimulation {
       queue(kFinish, [&] {
         PairStep<Executor, Questions>{to_, ask_, a}.finish();
         sleep_step(to_, a, options_.sleep);
-        to_.for_each(nullptr, bodies_, parallel_simulation_detail::StatesGoOn{a.before, a.start, a.end});
+        to_.for_each(nullptr, arrays_.bodies,
+                     parallel_simulation_detail::StatesGoOn{a.before, a.start, a.end});
         to_.for_each(nullptr, a.joints.count, parallel_simulation_detail::JointsGoOn{a.joints});
         to_.once(parallel_simulation_detail::CountsGoOn{a.counts});
       });
@@ -133,43 +128,47 @@ class ParallelSimulation {
     return to_.wait();
   }
   Status set_force(std::uint32_t body, const BodyForce& force) {
-    Status status = has_forces_ ? Status::kOk : fill<BodyForce>(forces_, {});
+    Status status = arrays_.has_forces ? Status::kOk : arrays_.fill(to_, arrays_.forces, BodyForce{});
     if (status != Status::kOk) return status;
-    if (!has_forces_) has_forces_ = true, ++generation_;
-    return change_and_wake<BodyForce>(body, force, {forces_.data() + body});
+    if (!arrays_.has_forces) arrays_.has_forces = true, ++generation_;
+    return change_and_wake<BodyForce>(body, force, {arrays_.forces.data() + body});
   }
   Status change(std::uint32_t body, const BodySettings& settings) {
-    return change_and_wake<BodySettings>(body, settings, {properties_.data() + body, acting_.data() + body});
+    return change_and_wake<BodySettings>(body, settings,
+                                         {arrays_.properties.data() + body, arrays_.acting.data() + body});
   }
 
   /// Keeps the state, and goes on where save() was called. Condition of restore(): the state is of this
   /// simulation, since its bodies were set. There are no contacts then, and nothing has begun or ended.
   Status save(ParallelState<Executor>& state) {
     state.records = records_count_, state.remembered = remembered_count_;
-    state.within = within_, state.has_forces = has_forces_;
+    state.within = within_, state.has_forces = arrays_.has_forces;
     std::size_t bytes = 0;
-    visit_kept(state, [&](const auto&, std::size_t count) { bytes += count; });
+    arrays_.visit_kept(state.records, state.remembered, state.has_forces,
+                       [&](const auto&, std::size_t count) { bytes += count; });
     const Status status = state.bytes.reserve(bytes);
     if (status != Status::kOk) return status;
     std::size_t place = 0;
-    visit_kept(state, [&](const auto& array, std::size_t count) {
-      to_.copy_within(reinterpret_cast<const char*>(array.data()), count, state.bytes.data() + place);
-      place += count;
-    });
+    arrays_.visit_kept(
+        state.records, state.remembered, state.has_forces, [&](const auto& array, std::size_t count) {
+          to_.copy_within(reinterpret_cast<const char*>(array.data()), count, state.bytes.data() + place);
+          place += count;
+        });
     return joints_.save(to_, state.joints);
   }
   Status restore(const ParallelState<Executor>& state) {
-    if (has_forces_ != state.has_forces || within_ != state.within) ++generation_;
-    has_forces_ = state.has_forces, within_ = state.within;
+    if (arrays_.has_forces != state.has_forces || within_ != state.within) ++generation_;
+    arrays_.has_forces = state.has_forces, within_ = state.within;
     records_count_ = state.records, remembered_count_ = state.remembered;
     std::size_t place = 0;
-    visit_kept(state, [&](const auto& array, std::size_t count) {
-      to_.copy_within(state.bytes.data() + place, count, reinterpret_cast<char*>(array.data()));
-      place += count;
-    });
+    arrays_.visit_kept(
+        state.records, state.remembered, state.has_forces, [&](const auto& array, std::size_t count) {
+          to_.copy_within(state.bytes.data() + place, count, reinterpret_cast<char*>(array.data()));
+          place += count;
+        });
     StepCounts counts = {};
     counts.records_before = records_count_;
-    Status status = put(counts_, counts);
+    Status status = arrays_.put(to_, arrays_.counts, counts);
     if (!joints_.all().empty()) ++generation_;
     if (status == Status::kOk) status = joints_.restore(to_, state.joints);
     if (status != Status::kOk) return status;
@@ -185,25 +184,19 @@ class ParallelSimulation {
 
   /// Copy what World's functions of these names return: began and ended since forget_call().
   Status touching(std::vector<WorldTouch>& pairs) {
-    return list(&PairRecord::touches, touches_[0].data(), listed_touches_, pairs);
+    return list(&PairRecord::touches, arrays_.touches[0].data(), listed_touches_, pairs);
   }
   Status began(std::vector<WorldTouch>& pairs) {
-    return list(&PairRecord::began, begun_[0].data(), listed_touches_, pairs);
+    return list(&PairRecord::began, arrays_.begun[0].data(), listed_touches_, pairs);
   }
   Status ended(std::vector<ObjectPair>& pairs) {
-    return list(&PairRecord::ended, records_[0].data(), listed_pairs_, pairs);
+    return list(&PairRecord::ended, arrays_.records[0].data(), listed_pairs_, pairs);
   }
 
   /// Returns the bytes of the executor's memory that bodies, pairs and contacts take, but for those of
   /// questions and the executor.
   std::size_t bytes() const {
-    return bytes_of(solver_, newton_, joints_, properties_, acting_, states_[0], states_[1], states_[2], pulls_,
-                    forces_, placed_, idle_, asset_, group_, label_, marks_, pose_, motion_, ways_,
-                    ways_ahead_, quiet_, inner_radius_, boxes_, records_[0], records_[1], touches_[0],
-                    touches_[1], begun_[0], begun_[1], plans_, flags_, sums_, list_, row_first_, row_end_,
-                    asked_, moved_pairs_, reach_, moved_asset_, moved_pose_, approaches_, touching_, found_,
-                    contacts_, remembered_[0], remembered_[1], place_, contact_marks_, impulses_before_,
-                    impulses_, done_, counts_, sums_of_contacts_, listed_touches_, listed_pairs_);
+    return bytes_of(solver_, newton_, joints_, arrays_, sums_of_contacts_, listed_touches_, listed_pairs_);
   }
 
   /// The joints, by the place of each: what Simulation's functions of these names do. That joined bodies meet
@@ -236,20 +229,20 @@ class ParallelSimulation {
   /// Adds up the contacts of the last step.
   Status sum_contacts(ContactSums& sums) {
     sums = {};
-    const Status status = put(sums_of_contacts_, sums);
+    const Status status = arrays_.put(to_, sums_of_contacts_, sums);
     if (status != Status::kOk) return status;
     dynamics::sum_contacts(to_, arrays(), records_count_, sums_of_contacts_.data());
     return to_.copy(sums_of_contacts_.data(), std::span(&sums, 1));
   }
 
-  /// Copies what the next step starts from to the CPU, but for forces, settings of bodies, touches and joints;
-  /// and lets a simulation of the same bodies go on from there. bodies: as given to set_bodies().
+  /// Copies what the next step starts from to the CPU, but for forces, settings of bodies, touches and
+  /// joints; and lets a simulation of the same bodies go on from there. bodies: as given to set_bodies().
   Status save(std::span<const BodyProperties> bodies, SimulationState& state) {
     const StepArrays a = arrays();
     std::vector<PairRecord> records(records_count_);
     std::vector<CachedContact> remembered(remembered_count_);
-    state.states.resize(bodies_), state.ahead.before.resize(bodies_);
-    state.quiet.resize(bodies_), state.groups.resize(bodies_);
+    state.states.resize(arrays_.bodies), state.ahead.before.resize(arrays_.bodies);
+    state.quiet.resize(arrays_.bodies), state.groups.resize(arrays_.bodies);
     for (Status status :
          {to_.copy(a.records_before, std::span(records)),
           to_.copy(a.remembered_before, std::span(remembered)), to_.copy(a.start, std::span(state.states)),
@@ -265,12 +258,12 @@ class ParallelSimulation {
     records_count_ = static_cast<std::uint32_t>(kept.records.size());
     remembered_count_ = static_cast<std::uint32_t>(kept.remembered.size());
     std::vector<BodyProperties> acting(bodies.begin(), bodies.end());
-    for (std::uint32_t i = 0; i < bodies_; ++i) {
+    for (std::uint32_t i = 0; i < arrays_.bodies; ++i) {
       if (state.groups[i] != Sleep::kAwake) acting[i].motion = Motion::fixed;
     }
-    Status out = records_count_ > most_pairs_ ? reserve_pairs(records_count_) : Status::kOk;
-    if (out == Status::kOk && remembered_count_ > most_remembered_)
-      out = reserve_contacts(most_found_, remembered_count_);
+    Status out = records_count_ > arrays_.most_pairs ? reserve_pairs(records_count_) : Status::kOk;
+    if (out == Status::kOk && remembered_count_ > arrays_.most_remembered)
+      out = reserve_contacts(arrays_.most_found, remembered_count_);
     ++generation_;
     const StepArrays a = arrays();
     const auto copy = [&]<typename T>(std::span<const T> from, T* to) {
@@ -284,10 +277,10 @@ class ParallelSimulation {
     copy(std::span(state.quiet), a.quiet), copy(std::span(state.groups), a.group);
     StepCounts counts = {};
     counts.records_before = records_count_;
-    return out == Status::kOk ? put(counts_, counts) : out;
+    return out == Status::kOk ? arrays_.put(to_, arrays_.counts, counts) : out;
   }
 
-  std::uint32_t bodies() const { return bodies_; }
+  std::uint32_t bodies() const { return arrays_.bodies; }
   std::uint32_t bad_body() const { return std::min(read_.bad_start, read_.bad_body); }
   const StepCounts& counts() const { return read_; }  ///< of the last step
   /// Returns what Newton's method did in the last step. Condition: the solver is not SolverKind::soft.
@@ -295,32 +288,7 @@ class ParallelSimulation {
 
   /// The arrays of the last step, whose results are those of the step before now.
   StepArrays arrays(double dt = 0) const {
-    StepArrays a = {};
-    a.bodies = bodies_;
-    a.properties = properties_.data(), a.acting = acting_.data();
-    a.before = states_[0].data(), a.start = states_[1].data(), a.end = states_[2].data();
-    a.pulls = pulls_.data(), a.forces = has_forces_ ? forces_.data() : nullptr;
-    a.placed = placed_.data(), a.idle = idle_.data();
-    a.asset = asset_.data(), a.pose = pose_.data(), a.motion = motion_.data();
-    a.ways = ways_.data(), a.ways_ahead = ways_ahead_.data();
-    a.quiet = quiet_.data(), a.group = group_.data(), a.label = label_.data(), a.marks = marks_.data();
-    a.inner_radius = inner_radius_.data(), a.boxes = boxes_.data();
-    a.most_pairs = most_pairs_;
-    a.records_before = records_[0].data(), a.records = records_[1].data();
-    a.touches_before = touches_[0].data(), a.touches = touches_[1].data();
-    a.begun_before = begun_[0].data(), a.begun = begun_[1].data();
-    a.plans = plans_.data(), a.flags = flags_.data(), a.sums = sums_.data(), a.list = list_.data();
-    a.asked = asked_.data(), a.reach = reach_.data();
-    a.row_first = row_first_.data(), a.row_end = row_end_.data();
-    a.most_moved = most_moved_, a.moved_pairs = moved_pairs_.data(), a.moved_asset = moved_asset_.data();
-    a.moved_pose = moved_pose_.data();
-    a.approaches = approaches_.data(), a.touching = touching_.data();
-    a.most_found = most_found_, a.most_remembered = most_remembered_;
-    a.found = found_.data();
-    a.remembered_before = remembered_[0].data(), a.remembered = remembered_[1].data();
-    a.contacts = contacts_.data(), a.place = place_.data(), a.contact_marks = contact_marks_.data();
-    a.impulses_before = impulses_before_.data(), a.impulses = impulses_.data(), a.done = done_.data();
-    a.counts = counts_.data();
+    StepArrays a = arrays_.view();
     a.joints = joints_.arrays(&a.counts->broken);
     a.dt = dt, a.thinnest = thinnest_, a.gravity = options_.gravity, a.options = options_.solver;
     return a;
@@ -372,8 +340,8 @@ class ParallelSimulation {
 
   // The CPU limits fast bodies, in steps that have any.
   Status limit(const StepArrays& a) {
-    std::vector<BodyProperties> acting(bodies_);
-    std::vector<BodyState> start(bodies_), end(bodies_);
+    std::vector<BodyProperties> acting(arrays_.bodies);
+    std::vector<BodyState> start(arrays_.bodies), end(arrays_.bodies);
     Status status = to_.copy(a.acting, std::span(acting));
     if (status == Status::kOk) status = to_.copy(a.start, std::span(start));
     if (status == Status::kOk) status = to_.copy(a.end, std::span(end));
@@ -392,7 +360,7 @@ class ParallelSimulation {
                            a.contacts,   a.impulses_before,
                            a.touching,   &a.counts->touching,
                            a.most_pairs, a.dt,
-                            a.joints};
+                           a.joints};
     if (has_newton()) input = newton_.step(to_, input, a.options, output);
     solver_.step(to_, input, a.options, output);
   }
@@ -402,13 +370,15 @@ class ParallelSimulation {
   // Makes room for the bodies and pairs of a solver.
   Status reserve_solvers() {
     const std::uint32_t units = std::max(newton_.units(), kNewtonUnits);
-    const Status status = has_newton() ? newton_.reserve(to_, bodies_, most_pairs_, units) : Status::kOk;
-    return status == Status::kOk ? solver_.reserve(to_, usual_room(bodies_, most_pairs_, most_remembered_))
-                                 : status;
+    const Status status =
+        has_newton() ? newton_.reserve(to_, arrays_.bodies, arrays_.most_pairs, units) : Status::kOk;
+    return status == Status::kOk
+               ? solver_.reserve(to_, usual_room(arrays_.bodies, arrays_.most_pairs, arrays_.most_remembered))
+               : status;
   }
 
   void queue_reading() {
-    to_.copy_later(counts_.data(), read_);
+    to_.copy_later(arrays_.counts.data(), read_);
     to_.copy_later(solver_.needs(), solver_needs_);
     if (has_newton()) to_.copy_later(newton_.needs(), newton_needs_);
     ask_.read_needs();
@@ -422,16 +392,17 @@ class ParallelSimulation {
     if (status == Status::kOk) status = ask_.make_room(grew);
     const double needed = read_.reach.farthest(0.5 * options_.solver.slop);
     if (needed > within_) within_ = 1.5 * needed, grew = true;
-    if (status == Status::kOk && read_.pairs > most_pairs_) {
+    if (status == Status::kOk && read_.pairs > arrays_.most_pairs) {
       grew = true;
       status = reserve_pairs(read_.pairs + read_.pairs / 4);
     }
     const std::uint32_t moved = std::max({read_.middle, read_.approaches, read_.surprised});
-    if (status == Status::kOk && moved > most_moved_) {
+    if (status == Status::kOk && moved > arrays_.most_moved) {
       grew = true;
-      status = reserve_moved(moved + moved / 2);
+      status = arrays_.reserve_moved(to_, moved + moved / 2);
     }
-    if (status == Status::kOk && (read_.found > most_found_ || read_.remembered > most_remembered_)) {
+    if (status == Status::kOk &&
+        (read_.found > arrays_.most_found || read_.remembered > arrays_.most_remembered)) {
       grew = true;
       status = reserve_contacts(read_.found + read_.found / 4, read_.remembered + read_.remembered / 4);
     }
@@ -442,7 +413,7 @@ class ParallelSimulation {
     if (status == Status::kOk && !grew && has_newton() && newton_needs_.has_room == 0) {
       grew = true;
       const std::uint32_t units = newton_needs_.units + newton_needs_.units / 4;
-      status = newton_.reserve(to_, bodies_, most_pairs_, units);
+      status = newton_.reserve(to_, arrays_.bodies, arrays_.most_pairs, units);
     }
     whole = !grew;
     if (grew) ++generation_;
@@ -453,29 +424,13 @@ class ParallelSimulation {
   Status go_on() {
     constexpr double kWide = 3;
     records_count_ = read_.pairs, remembered_count_ = read_.remembered;
-    std::swap(records_[0], records_[1]), std::swap(remembered_[0], remembered_[1]);
-    std::swap(touches_[0], touches_[1]), std::swap(begun_[0], begun_[1]);
+    arrays_.go_on();
     parity_ = 1 - parity_;
     if (read_.broken > 0) ++generation_;
     const Status joints = joints_.take_broken(to_, read_.broken > 0);
     const double needed = read_.reach.farthest(0.5 * options_.solver.slop);
     if (kWide * needed < within_) within_ = 1.5 * needed, ++generation_;
     return joints == Status::kOk ? to_.status() : joints;
-  }
-
-  // Calls visit(array, bytes) for each array of the state, and what of it is kept. Arrays grow, but do not
-  // shrink, and all that grew kept these.
-  template <typename Visit>
-  void visit_kept(const ParallelState<Executor>& state, const Visit& visit) const {
-    const auto rows = [&]<typename T>(const Array<T>& array, std::size_t count) {
-      visit(array, count * sizeof(T));
-    };
-    rows(properties_, bodies_), rows(acting_, bodies_);
-    rows(states_[0], bodies_), rows(states_[1], bodies_);
-    rows(placed_, bodies_), rows(quiet_, bodies_), rows(group_, bodies_);
-    if (state.has_forces) rows(forces_, bodies_);
-    rows(records_[0], state.records), rows(touches_[0], state.records);
-    rows(remembered_[0], state.remembered);
   }
 
   // Writes what is not what it was, and wakes the body then.
@@ -509,96 +464,27 @@ class ParallelSimulation {
     return to_.copy(listed.data(), std::span(out));
   }
 
-  template <typename T>
-  Status put(Array<T>& array, const T& value) {
-    const Status status = array.reserve(1);
-    return status == Status::kOk ? to_.copy(std::span<const T>(&value, 1), array.data()) : status;
-  }
-  template <typename T>
-  Status put(Array<T>& array, std::span<const T> values) {
-    const Status status = array.reserve(std::max<std::size_t>(1, values.size()));
-    return status == Status::kOk && !values.empty() ? to_.copy(values, array.data()) : status;
-  }
-  template <typename T>
-  Status fill(Array<T>& array, const T& value) {
-    return put<T>(array, std::vector<T>(bodies_, value));
-  }
-
-  Status reserve_bodies(const ParallelBodies& bodies) {
-    std::vector<std::uint32_t> asset;
-    for (const BodyProperties& body : bodies.properties) asset.push_back(body.shape);
-    Status out = Status::kOk;
-    for (Status status :
-         {put<BodyProperties>(properties_, bodies.properties),
-          put<BodyProperties>(acting_, bodies.properties), put<BodyState>(states_[0], bodies.states),
-          put<BodyState>(states_[1], bodies.states), put<BodyState>(states_[2], bodies.states),
-          put<std::uint32_t>(asset_, asset), put<double>(inner_radius_, bodies.inner_radii),
-          put<AssetBox>(boxes_, bodies.boxes), fill<std::uint8_t>(placed_, 0), fill<double>(quiet_, 0),
-          fill<std::uint32_t>(group_, Sleep::kAwake), fill<std::uint8_t>(idle_, 0), pulls_.reserve(bodies_),
-          pose_.reserve(bodies_), motion_.reserve(bodies_), ways_.reserve(bodies_),
-          ways_ahead_.reserve(bodies_), label_.reserve(bodies_), marks_.reserve(bodies_)}) {
-      if (out == Status::kOk) out = status;
-    }
-    return out;
-  }
-
   Status reserve_pairs(std::uint32_t pairs) {
-    const std::uint32_t kept = most_pairs_;
-    Status out = Status::kOk;
-    for (Status status :
-         {records_[0].grow(pairs, kept), records_[1].grow(pairs, kept), touches_[0].grow(pairs, kept),
-          touches_[1].grow(pairs, kept), begun_[0].grow(pairs, kept), begun_[1].grow(pairs, kept),
-          plans_.reserve(pairs), flags_.reserve(pairs + 1), sums_.reserve(pairs + 1), list_.reserve(pairs),
-          asked_.reserve(pairs), reach_.reserve(pairs), row_first_.reserve(pairs), row_end_.reserve(pairs),
-          touching_.reserve(pairs), to_.reserve(pairs + 1), ask_.reserve(bodies_, pairs)}) {
-      if (out == Status::kOk) out = status;
-    }
-    most_pairs_ = out == Status::kOk ? pairs : 0;
-    return out == Status::kOk ? reserve_solvers() : out;
+    Status status = arrays_.reserve_pairs(pairs);
+    if (status == Status::kOk) status = to_.reserve(pairs + 1);
+    if (status == Status::kOk) status = ask_.reserve(arrays_.bodies, pairs);
+    return status == Status::kOk ? reserve_solvers() : status;
   }
-
-  Status reserve_moved(std::uint32_t rows) {
-    std::vector<ObjectPair> pairs(rows);
-    for (std::uint32_t r = 0; r < rows; ++r) pairs[r] = {2 * r, 2 * r + 1};
-    Status out = Status::kOk;
-    // Questions look at the poses of all bodies.
-    for (Status status :
-         {put<ObjectPair>(moved_pairs_, pairs),
-          put<std::uint32_t>(moved_asset_, std::vector<std::uint32_t>(2 * rows)),
-          put<Pose>(moved_pose_, std::vector<Pose>(2 * rows, kIdentityPose)), approaches_.reserve(rows)}) {
-      if (out == Status::kOk) out = status;
-    }
-    most_moved_ = out == Status::kOk ? rows : 0;
-    return out;
-  }
-
   Status reserve_contacts(std::uint32_t found, std::uint32_t remembered) {
-    found = std::max(found, most_found_), remembered = std::max(remembered, most_remembered_);
-    const std::uint32_t kept = most_remembered_;
-    Status out = Status::kOk;
-    for (Status status :
-         {found_.reserve(found), remembered_[0].grow(remembered, kept), remembered_[1].grow(remembered, kept),
-          contacts_.grow(remembered, kept), place_.reserve(remembered),
-          contact_marks_.reserve(2 * remembered), impulses_before_.reserve(remembered),
-          impulses_.reserve(remembered), done_.grow(remembered, kept)}) {
-      if (out == Status::kOk) out = status;
-    }
-    if (out != Status::kOk) return out;
-    most_found_ = found, most_remembered_ = remembered;
-    return reserve_solvers();
+    const Status status = arrays_.reserve_contacts(found, remembered);
+    return status == Status::kOk ? reserve_solvers() : status;
   }
 
   Executor& to_;
   Questions& ask_;
+  ParallelArrays<Executor> arrays_;
   ParallelSoftStep<Executor> solver_;
   ParallelJoints<Executor> joints_;
   ParallelNewtonStep<Executor> newton_;
   ParallelOptions options_;
-  std::uint32_t bodies_ = 0, most_pairs_ = 0, most_moved_ = 0, most_found_ = 0, most_remembered_ = 0;
   std::uint32_t records_count_ = 0, remembered_count_ = 0;  // of the last step that was whole
   double within_ = 0;                                       // how far apart near pairs are
   double thinnest_ = INFINITY;
-  bool has_forces_ = false;
   StepCounts read_ = {};
   SoftStepNeeds solver_needs_ = {};
   NewtonNeeds newton_needs_ = {};
@@ -606,35 +492,6 @@ class ParallelSimulation {
   std::uint64_t generation_ = 0;  // of all that is queued, memory included
   int parity_ = 0;                // of the step: records change places
   typename Executor::Sequence sequences_[kParts][2];
-
-  // See StepArrays.
-  Array<BodyProperties> properties_, acting_;
-  Array<BodyState> states_[3];
-  Array<Pull> pulls_;
-  Array<BodyForce> forces_;
-  Array<std::uint8_t> placed_, idle_;
-  Array<std::uint32_t> asset_, group_, label_, marks_;
-  Array<Pose> pose_;
-  Array<Motion> motion_;
-  Array<BodyWay> ways_, ways_ahead_;
-  Array<double> quiet_, inner_radius_;
-  Array<AssetBox> boxes_;
-  Array<PairRecord> records_[2];
-  Array<WorldTouch> touches_[2], begun_[2];
-  Array<PairPlan> plans_;
-  Array<std::uint32_t> flags_, sums_, list_, row_first_, row_end_;
-  Array<ObjectPair> asked_, moved_pairs_;
-  Array<double> reach_;
-  Array<std::uint32_t> moved_asset_;
-  Array<Pose> moved_pose_;
-  Array<Approach> approaches_;
-  Array<ContactPair> touching_;
-  Array<ContactPoint> found_, contacts_;
-  Array<CachedContact> remembered_[2];
-  Array<std::uint32_t> place_;
-  Array<std::uint8_t> contact_marks_;
-  Array<ContactImpulse> impulses_before_, impulses_, done_;
-  Array<StepCounts> counts_;
 
   Array<WorldTouch> listed_touches_;
   Array<ObjectPair> listed_pairs_;

@@ -232,7 +232,8 @@ void check_gpu_options(const SimulateArguments& arguments) {
 std::unique_ptr<BodyMover> make_mover(const SimulateArguments& arguments, const Start& start) {
   const SimulatorOptions& options = arguments.simulator;
   const auto& [bodies, states, findings, triangles] = start.bodies;
-  if (arguments.on_gpu()) return make_gpu_mover(start.shapes(), bodies, states, start.filter, options, arguments.continuous);
+  if (arguments.on_gpu())
+    return make_gpu_mover(start.shapes(), bodies, states, start.filter, options, arguments.continuous);
   auto engine = make_engine(arguments.engine,
                             ContactOptions{.mode = arguments.fast ? QueryMode::fast : QueryMode::exact});
   engine->set_filter(start.filter);

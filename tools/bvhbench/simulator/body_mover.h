@@ -33,7 +33,8 @@ class MovesBy final : public BodyMover {
  public:
   template <typename... Arguments>
   explicit MovesBy(Arguments&&... arguments)
-      : by_(Calling::of([&] { return std::make_unique<Simulation>(std::forward<Arguments>(arguments)...); })) {}
+      : by_(Calling::of(
+            [&] { return std::make_unique<Simulation>(std::forward<Arguments>(arguments)...); })) {}
 
   StepRecord step() override {
     return Calling::of([&] { return by_->step(); });

@@ -18,10 +18,11 @@ struct GpuBodyState {
 };
 
 /// Rigid bodies of meshes that move on a GPU: those of World, by the same rules, but that joints, and large
-/// groups of bodies, are always soft. Contacts are found, solved and remembered in GPU memory; the CPU reads a
-/// few numbers once a step, and limits continuous motion in steps that have fast bodies. Throws nothing. Movable, not
-/// copyable. One call at a time, and all with the GPU that was the current one at set_assets(). The same
-/// calls give the same bytes on GPUs of one kind; docs/dynamics.md says how they differ from World's.
+/// groups of bodies, are always soft. Contacts are found, solved and remembered in GPU memory; the CPU reads
+/// a few numbers once a step, and limits continuous motion in steps that have fast bodies. Throws nothing.
+/// Movable, not copyable. One call at a time, and all with the GPU that was the current one at set_assets().
+/// The same calls give the same bytes on GPUs of one kind; docs/dynamics.md says how they differ from
+/// World's.
 ///
 /// All functions may also return kNoGpu, kDriverTooOld, kGpuNotSupported, kOutOfGpuMemory or kCudaFailed.
 class GpuWorld {

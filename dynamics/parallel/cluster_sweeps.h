@@ -16,14 +16,14 @@ struct Body {
 
 /// What a block knows of the sweeps.
 struct Plan {
-  static constexpr std::uint32_t kMostTasks = 64;
+  static constexpr std::uint32_t kMostTasks = 64, kElsewhere = 0xFFFFFFFFu;
 
-  std::uint32_t has_room;
+  std::uint32_t bytes;                                 // that all tasks of the block would take
   std::uint32_t stages, end_of_stage[kSharedColours];  // tasks with which colours end that have any
-  std::uint32_t first_byte[kMostTasks + 1];            // of each of the block's tasks
+  std::uint32_t first_byte[kMostTasks];                // of each of the block's tasks, or kElsewhere
 };
 
-/// Where a task's part of SoftRows and its turns lie.
+/// Where a task's part of SoftRows and its turns lie, in the own memory of its block.
 struct TaskMemory {
   SoftPairs* pairs;
   SoftTurning* turnings;
@@ -70,7 +70,8 @@ class Sweeper {
     while (1u << shift_ < worker.blocks) ++shift_;
   }
 
-  /// Result: whether all has room.
+  /// Result: whether a cluster is worth it: most has room. A task that has none in its block stays where it
+  /// is.
   TANDEM_HD bool make_plan() {
     const std::uint64_t tables = kBytesOfPlan + std::uint64_t{slots_} * sizeof(Body);
     const bool may_fit = tasks_ <= Plan::kMostTasks * worker_.blocks && tables < worker_.own_bytes;
@@ -83,42 +84,42 @@ class Sweeper {
         plan_->first_byte[k] = TaskMemory::bytes(contacts_of(all_, task(k)));
     }
     worker_.meet();
-    if (worker_.team == 0 && worker_.lane == 0) add_up(tables);
+    if (worker_.team == 0 && worker_.lane == 0) add_up(static_cast<std::uint32_t>(tables));
     worker_.meet();
-    bool has_room = true;
+    std::uint64_t bytes = 0;
     for (std::uint32_t block = 0; block < worker_.blocks; ++block)
-      has_room = has_room && worker_.at_block(block, plan_)->has_room != 0;
-    return has_room;
+      bytes += worker_.at_block(block, plan_)->bytes;
+    return bytes <= std::uint64_t{worker_.blocks} * (worker_.own_bytes - tables);
   }
 
   TANDEM_HD void take() {
-    for (std::uint32_t k = worker_.team; k < own_tasks(); k += worker_.teams) {
+    for_own_tasks([&](std::uint32_t k) {
       const std::uint32_t contacts = contacts_of(all_, task(k)), group = kGroupsOfTeam * task(k);
       const TaskMemory to = memory(k, contacts);
       copy(all_.rows.pairs + group, to.pairs, kGroupsOfTeam);
       copy(all_.turns + group, to.turns, kGroupsOfTeam);
-      copy_rows(task(k), contacts,
-                [&](auto* there, auto* here, std::uint32_t count) { copy(there, here, count); });
-    }
+      copy_rows(k, contacts, [&](auto* there, auto* here, std::uint32_t count) { copy(there, here, count); });
+    });
     for_own_bodies([&](std::uint32_t i, Body& body) {
       body = {};
       body.gain = all_.gains[i];
     });
     worker_.meet();
     // The rows of a task are counted from its own first one.
-    for (std::uint32_t k = worker_.team; k < own_tasks(); k += worker_.teams) {
+    for_own_tasks([&](std::uint32_t k) {
       SoftPairs* const pairs = memory(k, 0).pairs;
       if (worker_.lane == 0) {
         for (std::uint32_t g = kGroupsOfTeam; g-- > 0;) pairs[g].first -= pairs[0].first;
       }
-    }
+    });
     worker_.meet();
   }
 
   TANDEM_HD void put_back() {
-    for (std::uint32_t k = worker_.team; k < own_tasks(); k += worker_.teams)
-      copy_rows(task(k), contacts_of(all_, task(k)),
+    for_own_tasks([&](std::uint32_t k) {
+      copy_rows(k, contacts_of(all_, task(k)),
                 [&](auto* there, auto* here, std::uint32_t count) { copy(here, there, count); });
+    });
     for_own_bodies([&](std::uint32_t i, Body& body) {
       all_.velocities[i] = shared_of(body.velocity), all_.moved[i] = shared_of(body.moved);
     });
@@ -163,14 +164,15 @@ class Sweeper {
     return {own + plan_->first_byte[k], contacts};
   }
 
-  TANDEM_HD void add_up(std::uint64_t byte) {
+  TANDEM_HD void add_up(std::uint32_t byte) {
+    plan_->bytes = 0;
     for (std::uint32_t k = 0; k < own_tasks(); ++k) {
       const std::uint32_t bytes = plan_->first_byte[k];
-      plan_->first_byte[k] = static_cast<std::uint32_t>(byte);
-      byte += bytes;
-      if (byte > worker_.own_bytes) break;
+      plan_->bytes += bytes;
+      const bool has_room = byte + bytes <= worker_.own_bytes;
+      plan_->first_byte[k] = has_room ? byte : Plan::kElsewhere;
+      if (has_room) byte += bytes;
     }
-    plan_->has_room = byte <= worker_.own_bytes ? 1 : 0;
     std::uint32_t stages = 0, begin = 0;
     for (std::uint32_t colour = 0; colour < kSharedColours; ++colour) {
       const std::uint32_t end = plan_->end_of_stage[colour];
@@ -180,6 +182,13 @@ class Sweeper {
     plan_->stages = stages;
   }
 
+  // Calls visit(k) for the team's tasks that have room.
+  template <typename Visit>
+  TANDEM_HD void for_own_tasks(const Visit& visit) {
+    for (std::uint32_t k = worker_.team; k < own_tasks(); k += worker_.teams) {
+      if (plan_->first_byte[k] != Plan::kElsewhere) visit(k);
+    }
+  }
   template <typename Visit>
   TANDEM_HD void for_own_bodies(const Visit& visit) {
     for (std::uint32_t slot = worker_.team * worker_.lanes + worker_.lane; slot < slots_;
@@ -198,12 +207,12 @@ class Sweeper {
       target[i] = source[i];
   }
 
-  // Calls copy_one(there, here, count) for what visits change. k: of the task in this block.
+  // Calls copy_one(there, here, count) for what visits of a task change.
   template <typename Copy>
-  TANDEM_HD void copy_rows(std::uint32_t of_task, std::uint32_t contacts, const Copy& copy_one) const {
-    const TaskMemory here = memory((of_task - worker_.block) >> shift_, contacts);
-    const std::uint32_t first = first_contact_of(all_, of_task);
-    copy_one(all_.rows.turnings + kGroupsOfTeam * of_task, here.turnings, kGroupsOfTeam);
+  TANDEM_HD void copy_rows(std::uint32_t k, std::uint32_t contacts, const Copy& copy_one) const {
+    const TaskMemory here = memory(k, contacts);
+    const std::uint32_t first = first_contact_of(all_, task(k));
+    copy_one(all_.rows.turnings + kGroupsOfTeam * task(k), here.turnings, kGroupsOfTeam);
     copy_one(all_.rows.normals + first, here.normals, contacts);
     copy_one(all_.rows.gaps + first, here.gaps, contacts);
     copy_one(all_.rows.frictions + first, here.frictions, contacts);
@@ -222,13 +231,21 @@ class Sweeper {
   }
 
   TANDEM_HD void visit(const Sweep& sweep, std::uint32_t k) const {
+    if (plan_->first_byte[k] == Plan::kElsewhere) {
+      visit_groups(sweep, all_.rows, all_.turns, kGroupsOfTeam * task(k));
+      return;
+    }
     const SoftPairs* const pairs = memory(k, 0).pairs;
     const SoftPairs& last = pairs[kGroupsOfTeam - 1];
     const TaskMemory here = memory(k, last.first + last.contacts);
     const SoftRows rows = {nullptr,      nullptr,   here.pairs,     here.turnings,
                            here.normals, here.gaps, here.frictions, all_.rows.inverse_h};
+    visit_groups(sweep, rows, here.turns, 0);
+  }
+  TANDEM_HD void visit_groups(const Sweep& sweep, const SoftRows& rows, const SoftTurns* turns,
+                              std::uint32_t first) const {
     for (std::uint32_t lane = worker_.lane; lane < kGroupsOfTeam * kSoftWidth; lane += worker_.lanes)
-      visit_lane(sweep, rows, here.turns, lane / kSoftWidth, static_cast<int>(lane % kSoftWidth));
+      visit_lane(sweep, rows, turns, first + lane / kSoftWidth, static_cast<int>(lane % kSoftWidth));
   }
 
   TANDEM_HD void visit_lane(const Sweep& sweep, const SoftRows& rows, const SoftTurns* turns,

@@ -20,8 +20,8 @@ struct ParallelBodies {
   std::span<const Joint> joints = {};
 };
 
-/// The arrays of a parallel simulation, in its executor's memory. Those with an element for each pair or contact
-/// grow; what the next step starts from stays in them then.
+/// The arrays of a parallel simulation, in its executor's memory. Those with an element for each pair or
+/// contact grow; what the next step starts from stays in them then.
 template <typename Executor>
 struct ParallelArrays {
   template <typename T>
@@ -59,7 +59,6 @@ struct ParallelArrays {
   Array<ContactImpulse> impulses_before, impulses, done;
   Array<StepCounts> counts;
 
-
   StepArrays view() const {
     StepArrays a = {};
     a.bodies = bodies;
@@ -91,7 +90,12 @@ struct ParallelArrays {
   }
 
   std::size_t bytes() const {
-    return bytes_of(properties, acting, states[0], states[1], states[2], pulls, forces, placed, idle, asset, group, label, marks, pose, motion, ways, ways_ahead, quiet, inner_radius, boxes, records[0], records[1], touches[0], touches[1], begun[0], begun[1], plans, flags, sums, list, row_first, row_end, asked, moved_pairs, reach, moved_asset, moved_pose, approaches, touching, found, contacts, remembered[0], remembered[1], place, contact_marks, impulses_before, impulses, done, counts);
+    return bytes_of(properties, acting, states[0], states[1], states[2], pulls, forces, placed, idle, asset,
+                    group, label, marks, pose, motion, ways, ways_ahead, quiet, inner_radius, boxes,
+                    records[0], records[1], touches[0], touches[1], begun[0], begun[1], plans, flags, sums,
+                    list, row_first, row_end, asked, moved_pairs, reach, moved_asset, moved_pose, approaches,
+                    touching, found, contacts, remembered[0], remembered[1], place, contact_marks,
+                    impulses_before, impulses, done, counts);
   }
 
   /// The results of a step become what the next one begins with.
@@ -111,8 +115,8 @@ struct ParallelArrays {
           put<BodyState>(to, states[1], all.states), put<BodyState>(to, states[2], all.states),
           put<std::uint32_t>(to, asset, shapes), put<double>(to, inner_radius, all.inner_radii),
           put<AssetBox>(to, boxes, all.boxes), fill<std::uint8_t>(to, placed, 0), fill<double>(to, quiet, 0),
-          fill<std::uint32_t>(to, group, Sleep::kAwake), fill<std::uint8_t>(to, idle, 0), pulls.reserve(bodies),
-          pose.reserve(bodies), motion.reserve(bodies), ways.reserve(bodies),
+          fill<std::uint32_t>(to, group, Sleep::kAwake), fill<std::uint8_t>(to, idle, 0),
+          pulls.reserve(bodies), pose.reserve(bodies), motion.reserve(bodies), ways.reserve(bodies),
           ways_ahead.reserve(bodies), label.reserve(bodies), marks.reserve(bodies)}) {
       if (out == Status::kOk) out = status;
     }
@@ -154,8 +158,8 @@ struct ParallelArrays {
     const std::uint32_t kept = most_remembered;
     Status out = Status::kOk;
     for (Status status :
-         {found.reserve(to_find), remembered[0].grow(to_remember, kept), remembered[1].grow(to_remember, kept),
-          contacts.grow(to_remember, kept), place.reserve(to_remember),
+         {found.reserve(to_find), remembered[0].grow(to_remember, kept),
+          remembered[1].grow(to_remember, kept), contacts.grow(to_remember, kept), place.reserve(to_remember),
           contact_marks.reserve(2 * to_remember), impulses_before.reserve(to_remember),
           impulses.reserve(to_remember), done.grow(to_remember, kept)}) {
       if (out == Status::kOk) out = status;

@@ -275,6 +275,17 @@ void add_tower(FallingBodies& to, double x, double y, int count) {
   }
 }
 
+TEST(ParallelStep, TellsWhatABoxSolvedByNewtonsMethodTouches) {
+  FallingBodies bodies(1);
+  BodyDescription& body = bodies.descriptions.emplace_back();
+  body.asset = 3, body.pose = shift(0, 0, 0.105);
+  BothWays both(bodies, {}, 1, {}, SolverKind::automatic);
+  std::uint32_t solved = 0;
+  both.steps(60, [&](int) { solved += both.parallel.newton().solved; });
+  EXPECT_GT(solved, 10u);
+  EXPECT_EQ(both.began.size(), 1u);
+}
+
 TEST(ParallelStep, SolvesATowerByNewtonsMethod) {
   FallingBodies tower(1);
   add_tower(tower, 0, 0, 30);

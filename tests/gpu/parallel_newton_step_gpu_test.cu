@@ -42,10 +42,15 @@ TEST_F(GpuNewtonStep, GivesWhatTheCpusSolverGives) {
   }
 }
 
+// Boxes that slide below a heavy one are soft on the CPU too, but for a single one.
 TEST_F(GpuNewtonStep, SolvesTowers) {
   for (const std::uint32_t boxes : {1u, 3u, 30u, 300u}) {
     SCOPED_TRACE(boxes);
-    expect_near_the_cpus(tower(boxes), 1);
+    expect_near_the_cpus(tower(boxes), boxes == 1 ? 1 : 0);
+    RandomHeap light = tower(boxes);
+    light.bodies[boxes] = light.bodies[boxes > 1 ? 1 : boxes];
+    for (BodyState& state : light.states) state.velocity = {};
+    expect_near_the_cpus(light, 1);
   }
 }
 

@@ -67,8 +67,7 @@ StepRecord GpuSimulation::step() {
   record.contacts = sums.contacts;
   record.penetration_max = sums.deepest, record.penetration_mean = sums.mean_depth(parts.options.solver.slop);
   const auto& [contacts, manifolds] = parts.on_gpu.questions.found();
-  record.object_pairs = contacts.object_pairs, record.block_pairs = contacts.block_pairs;
-  record.candidates = contacts.candidates, record.triangle_pairs = contacts.contacts;
+  record.triangle_pairs = contacts.contacts;
   record.segments = manifolds.segments, record.patches = manifolds.manifolds;
   record.open_curves = manifolds.open_curves;
   parts.read_states();

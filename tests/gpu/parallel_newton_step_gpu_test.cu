@@ -50,7 +50,7 @@ TEST_F(GpuNewtonStep, SolvesTowers) {
     RandomHeap light = tower(boxes);
     light.bodies[boxes] = light.bodies[boxes > 1 ? 1 : boxes];
     for (BodyState& state : light.states) state.velocity = {};
-    expect_near_the_cpus(light, 1);
+    expect_near_the_cpus(light, boxes <= 30 ? 1 : 0);
   }
 }
 

@@ -33,7 +33,7 @@ class GpuScriptTest(unittest.TestCase):
         self.bin.mkdir()
         self.write(self.bin / "nvidia-smi", "#!/bin/sh\necho 'NVIDIA Example, 80GB'\n")
         self.write(self.bin / "compute-sanitizer", "#!/bin/sh\necho '========= ERROR SUMMARY: 0 errors'\n")
-        for name in ("gpu_test", "first_sort_test", "contract_gpu_test", "paper_engine_test", "engine_gpu_test", "parallel_soft_step_gpu_test", "gpu_world_test", "gpu_absent_test", "gpu_use_test", "gpu_deform_test", "gpu_world_use_test", "libtandem.so.0", "libtandem_cuda.so.0"):
+        for name in ("gpu_test", "first_sort_test", "contract_gpu_test", "paper_engine_test", "engine_gpu_test", "parallel_newton_step_gpu_test", "parallel_soft_step_gpu_test", "gpu_world_test", "gpu_absent_test", "gpu_use_test", "gpu_deform_test", "gpu_world_use_test", "libtandem.so.0", "libtandem_cuda.so.0"):
             self.program(name, PASSED)
 
     def write(self, path, text):

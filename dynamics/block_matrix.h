@@ -117,8 +117,8 @@ TANDEM_HD inline void divide_by_transposed(double* x, const Matrix6& lower) {
 /// ascending layer, so that the matrix is a band, or in one that elimination_order() has found. Bodies are
 /// counted from 0 here.
 struct BlockMatrix {
-  // Of each body: the bodies further on that its column has, ascending, those that elimination joins to it
-  // included. Those of body j are rows[begin[j]] ... rows[begin[j + 1]).
+  // rows lists the bodies further on that the column of each body has, ascending, with those that elimination
+  // joins to it. Those of body j are rows[begin[j]] ... rows[begin[j + 1]).
   std::span<std::uint32_t> begin, rows;
   std::span<Matrix6> diagonal;
   std::span<Matrix6> blocks;  // of each of the rows

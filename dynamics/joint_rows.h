@@ -72,7 +72,7 @@ TANDEM_HD inline void set_direction(const JointDirection& from, const JointedBod
                   : 0;
 }
 
-/// The same, with how far it may go.
+/// Does what set_direction() does, and sets how far the row may still change what it changes.
 TANDEM_HD inline void follow_direction(const JointDirection& from, const JointedBody& a, const JointedBody& b,
                                        JointConstraint& row) {
   set_direction(from, a, b, row);

@@ -4,7 +4,7 @@
 
 #include "dynamics/joint.h"
 
-/// Where a joint's parts are and in which directions it acts, for host and device.
+/// These rules say where a joint's parts are and in which directions it acts, for host and device.
 namespace tandem::dynamics {
 
 namespace joint_rules_detail {

@@ -23,7 +23,7 @@ struct Plan {
   std::uint32_t first_byte[kMostTasks];                // of each of the block's tasks, or kElsewhere
 };
 
-/// Where a task's part of SoftRows and its turns lie, in the own memory of its block.
+/// Has the places of a task's part of SoftRows and its turns in the own memory of its block.
 struct TaskMemory {
   SoftPairs* pairs;
   SoftTurning* turnings;

@@ -43,7 +43,7 @@ struct NewtonIslandsView {
   ContactPairs pairs;
   NewtonNeeds* needs;
   std::uint32_t *listed_bodies, *listed_pairs;  // how many are listed
-  // Of each body:
+  // These have an element for each body.
   std::uint32_t* label;                               // see labels.h
   std::uint32_t *bodies_of, *pairs_of, *contacts_of;  // of the island whose first body it is
   std::uint32_t* island_of;                           // the same; kNone: it is not looked at

@@ -209,7 +209,7 @@ TEST(ParallelStep, FindsWhatAStepMissed) {
   EXPECT_GT(both.missed, 0u);
 }
 
-// Like a run file, which has neither distances nor where bodies were a step before.
+// The state lacks what a run file lacks: distances, and where bodies were a step before.
 TEST(ParallelStep, GoesOnFromWhatASimulationKept) {
   const FallingBodies bodies(24);
   BothWays one(bodies);

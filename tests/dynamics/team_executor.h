@@ -80,9 +80,10 @@ class TeamExecutor : public HostExecutor {
     for (std::uint32_t i = 0; i < below(count, most); ++i) {
       Shared shared;
       ThreadTeam::Shared of_team(team_);
-      std::vector<std::jthread> threads;
+      std::vector<std::thread> threads;
       for (std::uint32_t rank = 0; rank < team_; ++rank)
         threads.emplace_back([&, rank] { visit(ThreadTeam(of_team, rank, team_), i, shared); });
+      for (std::thread& thread : threads) thread.join();
     }
   }
 

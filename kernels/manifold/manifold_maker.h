@@ -3,7 +3,7 @@
 #include "kernels/manifold/patch_rim.h"
 #include "kernels/manifold/patch_sheets.h"
 
-/// The rule by which contacts become manifolds (docs/contacts.md), for CPU and GPU alike.
+/// The rule by which contacts become manifolds (docs/manifold_method.md), for CPU and GPU alike.
 namespace tandem::manifold {
 
 /// A line that sounds the depth at the rim is moved inwards by this part of the way to the middle, so that it

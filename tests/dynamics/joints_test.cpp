@@ -126,8 +126,7 @@ TEST(Joints, TwoBodiesThatAreFixedMoveAsOne) {
     const Vector3 end = {0.5, 0, 0};
     worst = std::max(worst, norm(apply(world.bodies()[0].pose, end) - apply(whole.bodies()[0].pose, end)));
   }
-  EXPECT_LT(worst, 0.08);  // where pairs that fall at 9 m/s meet 14 cm deep; 0.02 to 0.03 by most seeds  //
-                           // it has turned by 19 rad
+  EXPECT_LT(worst, 0.05);  // it has turned by 19 rad
   EXPECT_LT(two.most_apart(), 2e-11);
 }
 
@@ -296,7 +295,8 @@ TEST(Joints, AHeapOfJoinedBodiesHoldsTogether) {
     ASSERT_EQ(world.step(kStep), Status::kOk);
     worst = std::max(worst, scene.most_apart());
   }
-  EXPECT_LT(worst, 0.05);
+  // Some meet 14 cm deep, at 9 m/s. By most seeds it is 0.03.
+  EXPECT_LT(worst, 0.08);
   EXPECT_LT(scene.most_apart(), 1e-3);
   EXPECT_LT(scene.sums().kinetic, 0.01 * scene.sums().potential);
   for (const BodyMotion& body : world.bodies().subspan(1)) EXPECT_GT(body.centre[2], 0.05);

@@ -32,11 +32,12 @@ struct ContactIsland {
   std::span<std::uint32_t> contacts, a, b;
   std::span<ContactRow> normal, first, second;  ///< the latter two across the normal
   std::span<Vector3> first_direction, second_direction;
-  std::span<Vector3> drive;      ///< of normal, first, second: by bodies that move and are not moved
-  std::span<double> separation;  ///< of a gap; else the slop less the depth, at most 0
-  std::span<double> friction;    ///< Coulomb's coefficient
-  std::span<double> rebound;     ///< velocity along the normal that restitution asks for, or 0
-  std::span<Vector3> impulse;    ///< along normal, first, second, as a whole step would need it
+  std::span<Vector3> drive;  ///< of normal, first, second: by bodies that move and are not moved, at the end
+  std::span<double> drive_beyond_mean;  ///< of the normal
+  std::span<double> separation;         ///< of a gap; else the slop less the depth, at most 0
+  std::span<double> friction;           ///< Coulomb's coefficient
+  std::span<double> rebound;            ///< velocity along the normal that restitution asks for, or 0
+  std::span<Vector3> impulse;           ///< along normal, first, second, as a whole step would need it
 
   std::span<TouchingPair> pairs;                         ///< in the order of their contacts
   std::span<std::uint32_t> first_of_body, pair_of_body;  ///< pairs of each body, ascending, body by body
@@ -50,8 +51,9 @@ struct ContactIsland {
     carver.take(contact_count, normal), carver.take(contact_count, first);
     carver.take(contact_count, second), carver.take(contact_count, first_direction);
     carver.take(contact_count, second_direction), carver.take(contact_count, drive);
-    carver.take(contact_count, separation), carver.take(contact_count, friction);
-    carver.take(contact_count, rebound), carver.take(contact_count, impulse);
+    carver.take(contact_count, drive_beyond_mean), carver.take(contact_count, separation);
+    carver.take(contact_count, friction), carver.take(contact_count, rebound);
+    carver.take(contact_count, impulse);
     carver.take(pair_count, pairs);
     carver.take(body_count + 1, first_of_body), carver.take(2 * pair_count, pair_of_body);
   }
@@ -150,7 +152,8 @@ TANDEM_HD inline void fill_island_pair(const RowMaker& rows, const ContactPoint*
     island.a[i] = pair.a, island.b[i] = pair.b;
     island.normal[i] = made.normal, island.first[i] = made.first, island.second[i] = made.second;
     island.first_direction[i] = made.first_direction, island.second_direction[i] = made.second_direction;
-    island.drive[i] = made.drive, island.impulse[i] = made.impulse;
+    island.drive[i] = made.drive, island.drive_beyond_mean[i] = made.drive_beyond_mean;
+    island.impulse[i] = made.impulse;
     island.separation[i] = made.separation, island.rebound[i] = made.rebound;
     island.friction[i] = made.friction;
   });

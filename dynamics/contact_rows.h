@@ -34,11 +34,12 @@ struct SteppedBody {
 struct ContactRows {
   ContactRow normal, first, second;  ///< the latter two across the normal
   Vector3 first_direction, second_direction;
-  Vector3 drive;      ///< of normal, first, second: by bodies that move and are not moved
-  double separation;  ///< of a gap; else the slop less the depth, at most 0
-  double friction;    ///< Coulomb's coefficient
-  double rebound;     ///< velocity along the normal that restitution asks for, or 0
-  Vector3 impulse;    ///< along normal, first, second, as a whole step would need it
+  Vector3 drive;             ///< of normal, first, second: by bodies that move and are not moved, at the end
+  double drive_beyond_mean;  ///< of the normal
+  double separation;         ///< of a gap; else the slop less the depth, at most 0
+  double friction;           ///< Coulomb's coefficient
+  double rebound;            ///< velocity along the normal that restitution asks for, or 0
+  Vector3 impulse;           ///< along normal, first, second, as a whole step would need it
 
   TANDEM_HD double speed(const ContactRow& row, const Vector6& y_a, const Vector6& y_b) const {
     return dot(row.a, y_a) + dot(row.b, y_b);
@@ -114,6 +115,16 @@ class RowMaker {
     return mixed_material(step_.bodies[contact.body_a], step_.bodies[contact.body_b], step_.options);
   }
 
+  /// Returns what a time after the start of the step adds to the velocity of b's surface as seen from a's,
+  /// where one of the two is kinematic and turns: the place of the contact goes on as the centre of the other
+  /// one does, but by less than a radian. Without this, what a turntable carries creeps outwards, at
+  /// w^2 r dt / 2 or w^2 r dt.
+  TANDEM_HD Vector3 drive_gain(const ContactPoint& contact, double time) const {
+    const double since = time - contact.time;
+    return drive_gain(contact.body_b, contact.body_a, since) -
+           drive_gain(contact.body_a, contact.body_b, since);
+  }
+
   /// Returns how fast body b of a contact is turned against a by what contacts do not move.
   TANDEM_HD Vector3 turning_drive(const ContactPoint& contact) const {
     return spin_driven(contact.body_b) - spin_driven(contact.body_a);
@@ -133,6 +144,7 @@ class RowMaker {
   TANDEM_HD Vector3 velocity_at(std::uint32_t body, const Vector3& arm) const;
   TANDEM_HD Vector3 pull_at(std::uint32_t body, const Vector3& arm) const;
   TANDEM_HD Vector3 driven(std::uint32_t body, const Vector3& arm) const;
+  TANDEM_HD Vector3 drive_gain(std::uint32_t body, std::uint32_t other, double time) const;
   TANDEM_HD Vector3 spin_driven(std::uint32_t body) const;
 
   StepNumbers step_;
@@ -227,6 +239,14 @@ TANDEM_HD inline Vector3 RowMaker::driven(std::uint32_t body, const Vector3& arm
   return step_.states[body].velocity + cross(step_.states[body].angular_velocity, arm);
 }
 
+TANDEM_HD inline Vector3 RowMaker::drive_gain(std::uint32_t body, std::uint32_t other, double time) const {
+  if (step_.bodies[body].motion != Motion::kinematic) return Vector3{};
+  const BodyState& of = step_.states[body];
+  const double turn = std::fabs(time) * norm(of.angular_velocity);
+  const Vector3 way = time / std::max(1.0, turn) * (step_.states[other].velocity - of.velocity);
+  return cross(of.angular_velocity, way);
+}
+
 TANDEM_HD inline Vector3 RowMaker::spin_driven(std::uint32_t body) const {
   if (step_.bodies[body].motion != Motion::kinematic) return Vector3{};
   return step_.states[body].angular_velocity;
@@ -281,13 +301,16 @@ TANDEM_HD inline ContactRows RowMaker::rows(const ContactPoint& contact, const C
   const auto along = [&](const Vector3& x) {
     return Vector3{dot(contact.normal, x), dot(across.first, x), dot(across.second, x)};
   };
-  const Vector3 moving = driven(contact.body_b, meets.arm_b) - driven(contact.body_a, meets.arm_a);
+  const Vector3 gain = drive_gain(contact, step_.dt), mean_gain = drive_gain(contact, 0.5 * step_.dt);
+  const Vector3 moving = driven(contact.body_b, meets.arm_b) - driven(contact.body_a, meets.arm_a) + gain;
   const Vector3 pushed = along(impulse.tangential);
-  return {row(contact.normal), row(across.first),
-          row(across.second),  across.first,
-          across.second,       along(moving),
-          meets.separation,    material.friction,
-          meets.rebound,       {impulse.normal, pushed.y, pushed.z}};
+  ContactRows out;
+  out.normal = row(contact.normal), out.first = row(across.first), out.second = row(across.second);
+  out.first_direction = across.first, out.second_direction = across.second;
+  out.drive = along(moving), out.drive_beyond_mean = dot(contact.normal, gain - mean_gain);
+  out.separation = meets.separation, out.friction = material.friction, out.rebound = meets.rebound;
+  out.impulse = {impulse.normal, pushed.y, pushed.z};
+  return out;
 }
 
 /// Returns by how much an impulse of 1 about any axis changes how the bodies turn against each other, at

@@ -59,13 +59,15 @@ class JointedStep {
   double target(std::size_t contact) const { return scratch_.target[contact]; }
 
  private:
+  static constexpr double kUsable = 10;  // times what velocities of contacts may still change
+
   // The directions in which joints act turn with the bodies. Rows that are those of the middle of the step,
   // and velocities that obey the joints where the bodies then are, keep energy and angular momentum to second
   // order; but both are known only once the step is solved. So it is solved again with what is known of them,
   // each time nearer by a factor of about the angle that bodies turn in a step.
   bool solve_exactly() {
     constexpr int kMostJointRounds = 6;
-    constexpr double kGood = 0.1, kUsable = 10;  // times what velocities of contacts may still change
+    constexpr double kGood = 0.1;  // times what velocities of contacts may still change
     constexpr double kNearer = 0.5;
     const std::span<Vector6> end = scratch_.end;
     for (std::size_t j = 1; j < end.size(); ++j) end[j] += input_.dt * problem_.stepped[j].gravity;
@@ -86,7 +88,38 @@ class JointedStep {
       if (turned_far_) return false;
     }
     turned_far_ = !(worst <= kUsable * change);
-    return !turned_far_ && put_in_place();
+    if (turned_far_ || !put_in_place()) return false;
+    turned_far_ = !keeps_energy();
+    return !turned_far_;
+  }
+
+  // Returns whether joints did no work, but for a small part of what the bodies have: where they turn fast
+  // they may do more or less than none, and in the long run more. A step's parts bring this down. Motors may
+  // give what they do; limits may take, and so may joints of bodies that were pushed against them. Not looked
+  // at where contacts and kinematic bodies do work too.
+  bool keeps_energy() const {
+    constexpr double kSmall = 1e-3;
+    if (problem_.contact_count() > 0) return true;
+    double gain = 0, kinetic = 0;
+    for (std::uint32_t j = 1; j < problem_.body_count(); ++j) {
+      const std::uint32_t body = problem_.bodies[j];
+      const Vector6 way = input_.dt * scratch_.mean[j], &pull = problem_.stepped[j].gravity;
+      const BodyState end = state_at_end(problem_, input_, j, scratch_.end[j], way);
+      const double at_end = kinetic_energy(input_.bodies[body], end);
+      gain += at_end - kinetic_energy(input_.bodies[body], problem_.states[body]) - dot(pull, way);
+      kinetic += at_end + 0.5 * square(input_.dt * pull);
+    }
+    double given = 0;
+    bool takes = false;
+    for (std::size_t i = 0; i < problem_.joint_rows.size(); ++i) {
+      const JointRow& row = problem_.joint_rows[i];
+      if (row.drive != 0) return true;
+      const bool holds = row.kind == JointRowKind::hold;
+      const double impulse = std::fabs(rows_.impulse[i]), at_start = std::fabs(row.along(problem_.velocity));
+      takes = takes || (holds ? at_start > kUsable * step_.least_change() : impulse > 0);
+      if (row.kind == JointRowKind::motor) given += impulse * std::max(at_start, std::fabs(joints_.speed(i)));
+    }
+    return gain <= given + kSmall * kinetic && (takes || gain >= -kSmall * kinetic);
   }
 
   std::vector<double> impulses_before() const {

@@ -106,7 +106,8 @@ class NewtonStep {
     contacts_.set_softness(kSoftness);
     team_.each(island_.contact_count(), [&](std::uint32_t i) {
       const double s = island_.separation[i];
-      with_.goal.target[i] = -(s < 0 ? correction_ : 1) * s / step_.dt;
+      // The way is that of the mean drive.
+      with_.goal.target[i] = island_.drive_beyond_mean[i] - (s < 0 ? correction_ : 1) * s / step_.dt;
       with_.goal.impulse.contact[i] = {}, with_.goal.bound[i] = 0;
     });
     team_.each(island_.pair_count(),

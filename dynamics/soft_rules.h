@@ -156,7 +156,8 @@ TANDEM_HD inline void fill_pair(const SoftNumbers& step, double unit_root, const
         if (less > 0) atomic_most(group.is_opposed, 1u);
         SoftFriction& friction = rows.frictions[group.first + i];
         put(across.first, friction.first.along, lane), put(across.second, friction.second.along, lane);
-        put(meets.velocity, friction.first.turn_a, lane);
+        // All substeps have the drive of the middle of the step.
+        put(meets.velocity + step.rows.drive_gain(contact, 0.5 * step.dt), friction.first.turn_a, lane);
         put(impulse.tangential / substeps, friction.second.turn_a, lane);
         put(material.friction, friction.coefficient, lane);
       });

@@ -187,6 +187,26 @@ TEST(Joints, AChainThatSwingsHoldsTogether) {
   }
 }
 
+// Three links that whip, of which only neighbours are joined, by hinges or by short rods.
+TEST(Joints, LinksThatWhipNeitherGainNorLoseEnergy) {
+  for (const JointKind kind : {JointKind::hinge, JointKind::distance}) {
+    JointedScene scene;
+    for (std::uint32_t i = 0; i < 3; ++i) {
+      scene.add_box({0.8, 0.1, 0.1}, shift(i + 0.5, 0, 0)).filter.mask = 0;
+      scene.joints.push_back({.kind = kind, .a = i == 0 ? kNoIndex : i - 1, .b = i, .axis = {0, 1, 0}});
+      scene.joints.back().anchor[0] = i - (kind == JointKind::distance ? 0.1 : 0);
+      scene.joints.back().anchor_b[0] = i + 0.1;
+    }
+    const double dt = kind == JointKind::hinge ? kStep : 0.5 * kStep;
+    World& world = scene.begin();
+    const double energy = scene.sums().energy(), depth = 3 * world.mass_of(0) * kGravity * 1.5;
+    while (world.time() < 30) {
+      ASSERT_EQ(world.step(dt), Status::kOk);
+      ASSERT_NEAR(scene.sums().energy() / depth, energy / depth, 0.02) << world.time();
+    }
+  }
+}
+
 // Four hinges hold the three bars of a plane linkage, which has one freedom, three times as much as it takes.
 TEST(Joints, AFourBarLinkageKeepsItsLoopClosed) {
   JointedScene scene;

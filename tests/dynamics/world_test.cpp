@@ -320,6 +320,29 @@ TEST(World, BodiesThatSleepOnEachOtherGoOnTouching) {
   }
 }
 
+// Newton's method solves a box alone, and the soft step a stack of 64.
+TEST(World, WhatATurntableCarriesStaysWhereItStands) {
+  constexpr double kRadius = 1, kSeconds = 5;
+  for (const int boxes : {1, 4}) {
+    const double spin = boxes == 1 ? 1.5 : 0.5;  // a stack would fall over
+    WorldOnGround scene(box(0.1F, 0.1F, 0.1F));
+    scene.bodies[0].filter.motion = Motion::kinematic;
+    scene.bodies[0].angular_velocity[2] = spin;
+    for (int i = 0; i < boxes * boxes * boxes; ++i) {
+      const double x = kRadius + 0.1 * (i % boxes), y = 0.1 * (i / boxes % boxes);
+      BodyDescription& body = scene.add(shift(x, y, 0.05 + 0.1 * (i / (boxes * boxes))));
+      body.velocity[0] = -spin * y, body.velocity[1] = spin * x, body.angular_velocity[2] = spin;
+    }
+    World& world = scene.begin();
+    for (double t = 0; t < kSeconds - 0.5 * kStep; t += kStep) ASSERT_EQ(world.step(kStep), Status::kOk);
+    for (std::uint32_t i = 1; i < world.bodies().size(); ++i) {
+      const double* start = scene.bodies[i].pose.translation;
+      const double* end = world.bodies()[i].pose.translation;
+      EXPECT_NEAR(std::hypot(end[0], end[1]), std::hypot(start[0], start[1]), 1e-3) << boxes;
+    }
+  }
+}
+
 TEST(World, AFixedOrKinematicBodyThatIsSetWakesWhatRestsOnItAndWhatItMeets) {
   for (const Motion motion : {Motion::fixed, Motion::kinematic}) {
     WorldOnGround scene(box(1, 1, 1));

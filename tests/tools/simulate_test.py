@@ -262,6 +262,19 @@ class Resuming(SimulateTest):
                 self.assert_same_run(whole, self.run_file)
                 self.run_file.unlink()
 
+    def test_bodies_in_flight_go_on_to_the_same_results(self):
+        """What is known of pairs that do not touch yet goes on too, and with it which pairs are asked about."""
+        pile = ["pile", *self.cows(), "--count", "20", "--frames"]
+        whole = self.outputs / "whole.h5"
+        self.simulate(*pile, "60", out=whole)
+        for made in ("1", "20", "40"):
+            with self.subTest(steps=made):
+                self.simulate(*pile, made)
+                self.run_file.rename(f"{self.run_file}.part")
+                self.simulate(*pile, "60", "--resume")
+                self.assert_same_run(whole, self.run_file)
+                self.run_file.unlink()
+
     def test_resume_starts_where_nothing_is_and_leaves_what_is_done(self):
         self.stack("--frames", "3", "--resume")
         before = self.run_file.read_bytes()
@@ -276,7 +289,8 @@ class Resuming(SimulateTest):
 
     def test_resume_refuses_a_state_that_is_not_finite_by_row(self):
         self.stack("--frames", "3")
-        for name, row in (("state/velocity", 5), ("state/position", 2), ("state/contacts/in_a", 1), ("state/contacts/normal_impulse", 0)):
+        for name, row in (("state/velocity", 5), ("state/position", 2), ("state/contacts/in_a", 1), ("state/contacts/normal_impulse", 0),
+                          ("state/before/position", 4)):
             with self.subTest(name=name):
                 sound = datasets(self.run_file)[name]
                 wrong = sound.copy()

@@ -69,9 +69,20 @@ def _breaking(value: float, name: str) -> float:
 _KINDS = ("ball", "hinge", "slider", "fixed", "distance")
 
 
+def _limits(value: Any) -> tuple[float, float]:
+    try:
+        least, most = value
+    except (TypeError, ValueError):
+        raise TypeError(f"limits is {value!r} where two numbers are wanted") from None
+    return number(least, "limits[0]"), number(most, "limits[1]")
+
+
 def _joint_rows(joints: Sequence[Joint]) -> Rows:
+    joints = list(joints)
     rows = np.zeros(len(joints), JOINT)
-    for row, joint in zip(rows, joints):
+    for i, (row, joint) in enumerate(zip(rows, joints)):
+        if not isinstance(joint, Joint):
+            raise TypeError(f"joint {i} is {type(joint).__name__} where a tandem.Joint is wanted")
         if joint.kind not in _KINDS:
             raise ValueError(f"kind is {joint.kind!r} where one of {', '.join(_KINDS)} is wanted")
         row["kind"] = _KINDS.index(joint.kind)
@@ -81,7 +92,7 @@ def _joint_rows(joints: Sequence[Joint]) -> Rows:
         row["axis"] = _vector(joint.axis, "axis")
         if joint.limits is not None:
             row["has_limits"] = 1
-            row["least"], row["most"] = joint.limits
+            row["least"], row["most"] = _limits(joint.limits)
         row["speed"], row["most_effort"] = number(joint.speed, "speed"), number(joint.most_effort, "most_effort")
         row["may_touch"] = flag(joint.may_touch, "may_touch")
         for name, most in (("breaking_force", joint.breaking_force), ("breaking_torque", joint.breaking_torque)):

@@ -62,98 +62,110 @@ using bench::Hdf5Input;
 using bench::Hdf5Output;
 using bench::Stored;
 
-// The datasets of a kind of row: calls visit(name, member) for each, one row for each element.
+constexpr const char* kFrames = "/frames";
+
+// Calls visit(name, member) for each dataset of a kind of row, by its name in the folder of such rows. It has
+// one row for each element.
 template <typename Visit>
 void for_each_column(const StepRecord&, const Visit& visit) {
-  visit("/frames/time", &StepRecord::time);
-  visit("/frames/seconds/update", &StepRecord::update);
-  visit("/frames/seconds/broad_phase", &StepRecord::broad_phase);
-  visit("/frames/seconds/traversal", &StepRecord::traversal);
-  visit("/frames/seconds/triangle_tests", &StepRecord::triangle_tests);
-  visit("/frames/seconds/transfer", &StepRecord::transfer);
-  visit("/frames/seconds/contacts", &StepRecord::generation);
-  visit("/frames/seconds/solver", &StepRecord::solver_seconds);
-  visit("/frames/seconds/step", &StepRecord::step_seconds);
-  visit("/frames/object_pairs", &StepRecord::object_pairs);
-  visit("/frames/kept_pairs", &StepRecord::kept_pairs);
-  visit("/frames/block_pairs", &StepRecord::block_pairs);
-  visit("/frames/candidates", &StepRecord::candidates);
-  visit("/frames/triangle_pairs", &StepRecord::triangle_pairs);
-  visit("/frames/segments", &StepRecord::segments);
-  visit("/frames/patches", &StepRecord::patches);
-  visit("/frames/open_curves", &StepRecord::open_curves);
-  visit("/frames/contacts", &StepRecord::contacts);
-  visit("/frames/islands", &StepRecord::islands);
-  visit("/frames/newton_islands", &StepRecord::newton_islands);
-  visit("/frames/sleeping", &StepRecord::sleeping);
-  visit("/frames/reentered", &StepRecord::reentered);
-  visit("/frames/contact_ratio", &StepRecord::contact_ratio);
-  visit("/frames/contact_area", &StepRecord::contact_area);
-  visit("/frames/penetration_max", &StepRecord::penetration_max);
-  visit("/frames/penetration_mean", &StepRecord::penetration_mean);
-  visit("/frames/residual_max", &StepRecord::residual_max);
-  visit("/frames/residual_rms", &StepRecord::residual_rms);
-  visit("/frames/kinetic_energy", &StepRecord::kinetic_energy);
-  visit("/frames/potential_energy", &StepRecord::potential_energy);
-  visit("/frames/linear_momentum", &StepRecord::linear_momentum);
-  visit("/frames/angular_momentum", &StepRecord::angular_momentum);
-  visit("/frames/speed_max", &StepRecord::speed_max);
-  visit("/frames/speed_mean", &StepRecord::speed_mean);
-  visit("/frames/spin_max", &StepRecord::spin_max);
+  visit("time", &StepRecord::time);
+  visit("seconds/update", &StepRecord::update);
+  visit("seconds/broad_phase", &StepRecord::broad_phase);
+  visit("seconds/traversal", &StepRecord::traversal);
+  visit("seconds/triangle_tests", &StepRecord::triangle_tests);
+  visit("seconds/transfer", &StepRecord::transfer);
+  visit("seconds/contacts", &StepRecord::generation);
+  visit("seconds/solver", &StepRecord::solver_seconds);
+  visit("seconds/step", &StepRecord::step_seconds);
+  visit("object_pairs", &StepRecord::object_pairs);
+  visit("kept_pairs", &StepRecord::kept_pairs);
+  visit("block_pairs", &StepRecord::block_pairs);
+  visit("candidates", &StepRecord::candidates);
+  visit("triangle_pairs", &StepRecord::triangle_pairs);
+  visit("segments", &StepRecord::segments);
+  visit("patches", &StepRecord::patches);
+  visit("open_curves", &StepRecord::open_curves);
+  visit("contacts", &StepRecord::contacts);
+  visit("islands", &StepRecord::islands);
+  visit("newton_islands", &StepRecord::newton_islands);
+  visit("sleeping", &StepRecord::sleeping);
+  visit("reentered", &StepRecord::reentered);
+  visit("contact_ratio", &StepRecord::contact_ratio);
+  visit("contact_area", &StepRecord::contact_area);
+  visit("penetration_max", &StepRecord::penetration_max);
+  visit("penetration_mean", &StepRecord::penetration_mean);
+  visit("residual_max", &StepRecord::residual_max);
+  visit("residual_rms", &StepRecord::residual_rms);
+  visit("kinetic_energy", &StepRecord::kinetic_energy);
+  visit("potential_energy", &StepRecord::potential_energy);
+  visit("linear_momentum", &StepRecord::linear_momentum);
+  visit("angular_momentum", &StepRecord::angular_momentum);
+  visit("speed_max", &StepRecord::speed_max);
+  visit("speed_mean", &StepRecord::speed_mean);
+  visit("spin_max", &StepRecord::spin_max);
 }
 
 template <typename Visit>
 void for_each_column(const BodyState&, const Visit& visit) {
-  visit("/state/position", &BodyState::position);
-  visit("/state/orientation", &BodyState::orientation);
-  visit("/state/velocity", &BodyState::velocity);
-  visit("/state/angular_velocity", &BodyState::angular_velocity);
+  visit("position", &BodyState::position);
+  visit("orientation", &BodyState::orientation);
+  visit("velocity", &BodyState::velocity);
+  visit("angular_velocity", &BodyState::angular_velocity);
 }
 
 template <typename Visit>
 void for_each_column(const CachedContact&, const Visit& visit) {
-  visit("/state/contacts/pair", &CachedContact::pair);
-  visit("/state/contacts/feature", &CachedContact::feature);
+  visit("pair", &CachedContact::pair);
+  visit("feature", &CachedContact::feature);
   visit(
-      "/state/contacts/in_a", [](auto& c) -> auto& { return c.anchor.in_a; });
+      "in_a", [](auto& c) -> auto& { return c.anchor.in_a; });
   visit(
-      "/state/contacts/in_b", [](auto& c) -> auto& { return c.anchor.in_b; });
-  visit("/state/contacts/normal_in_a", &CachedContact::normal_in_a);
+      "in_b", [](auto& c) -> auto& { return c.anchor.in_b; });
+  visit("normal_in_a", &CachedContact::normal_in_a);
   visit(
-      "/state/contacts/depth", [](auto& c) -> auto& { return c.anchor.depth; });
-  visit("/state/contacts/quiet_steps", &CachedContact::quiet_steps);
+      "depth", [](auto& c) -> auto& { return c.anchor.depth; });
+  visit("quiet_steps", &CachedContact::quiet_steps);
   visit(
-      "/state/contacts/normal_impulse", [](auto& c) -> auto& { return c.impulse.normal; });
+      "normal_impulse", [](auto& c) -> auto& { return c.impulse.normal; });
   visit(
-      "/state/contacts/tangential_impulse", [](auto& c) -> auto& { return c.impulse.tangential; });
+      "tangential_impulse", [](auto& c) -> auto& { return c.impulse.tangential; });
   visit(
-      "/state/contacts/turning_impulse", [](auto& c) -> auto& { return c.impulse.turning; });
+      "turning_impulse", [](auto& c) -> auto& { return c.impulse.turning; });
 }
 
 template <typename Visit>
 void for_each_column(const PosedBodies&, const Visit& visit) {
-  visit("/state/pairs/pair", &PosedBodies::pair);
+  visit("pair", &PosedBodies::pair);
   visit(
-      "/state/pairs/shape_a", [](auto& posed) -> auto& { return posed.a.asset; });
+      "shape_a", [](auto& posed) -> auto& { return posed.a.asset; });
   visit(
-      "/state/pairs/shape_b", [](auto& posed) -> auto& { return posed.b.asset; });
+      "shape_b", [](auto& posed) -> auto& { return posed.b.asset; });
   visit(
-      "/state/pairs/pose_a", [](auto& posed) -> auto& { return posed.a.pose; });
+      "pose_a", [](auto& posed) -> auto& { return posed.a.pose; });
   visit(
-      "/state/pairs/pose_b", [](auto& posed) -> auto& { return posed.b.pose; });
+      "pose_b", [](auto& posed) -> auto& { return posed.b.pose; });
+}
+
+template <typename Visit>
+void for_each_column(const PairApart&, const Visit& visit) {
+  visit("pair", &PairApart::pair);
+  visit("distance", &PairApart::distance);
 }
 
 template <typename Row>
-void write_rows(Hdf5Output& file, std::span<const Row> rows) {
-  for_each_column(Row(), [&](const char* name, auto member) { add_column(file, name, rows, member); });
+void write_rows(Hdf5Output& file, const std::string& folder, const std::vector<Row>& rows) {
+  for_each_column(Row(), [&](const char* name, auto member) {
+    add_column(file, folder + "/" + name, std::span(rows), member);
+  });
 }
 
 // Reads rows, as many as the first dataset has. Result: whether all have as many.
 template <typename Row>
-bool read_rows(const Hdf5Input& file, std::vector<Row>& rows) {
+bool read_rows(const Hdf5Input& file, const std::string& folder, std::vector<Row>& rows) {
   bool first = true, alike = true;
   for_each_column(Row(), [&](const char* name, auto member) {
-    const auto values = bench::read_values<std::decay_t<decltype(std::invoke(member, rows[0]))>>(file, name);
+    using Value = std::decay_t<decltype(std::invoke(member, rows[0]))>;
+    const auto values = bench::read_values<Value>(file, folder + "/" + name);
     alike = alike && (first || values.size() == rows.size());
     if (std::exchange(first, false)) rows.resize(values.size());
     for (std::size_t i = 0; i < std::min(rows.size(), values.size()); ++i)
@@ -164,13 +176,14 @@ bool read_rows(const Hdf5Input& file, std::vector<Row>& rows) {
 
 // Refuses numbers that are not finite, by dataset and row.
 template <typename Row>
-void require_finite(const std::string& path, std::span<const Row> rows) {
+void require_finite(const std::string& path, const std::string& folder, const std::vector<Row>& rows) {
   for_each_column(Row(), [&](const char* name, auto member) {
-    const auto numbers = bench::column(rows, member);
+    const auto numbers = bench::column(std::span(rows), member);
     for (std::size_t i = 0; i < numbers.size(); ++i) {
       if (std::isfinite(static_cast<double>(numbers[i]))) continue;
       const std::size_t row = i / (numbers.size() / rows.size());
-      throw FileError(path + ": " + name + ": row " + std::to_string(row) + ": a number is not finite");
+      throw FileError(path + ": " + folder + "/" + name + ": row " + std::to_string(row) +
+                      ": a number is not finite");
     }
   });
 }
@@ -219,38 +232,50 @@ Trajectory read_trajectory(const Hdf5Input& file, const std::string& path, std::
   return trajectory;
 }
 
+// The folders of a state's rows.
+constexpr const char *kBodies = "/state", *kContacts = "/state/contacts", *kPosed = "/state/pairs",
+                     *kBefore = "/state/before", *kApart = "/state/apart";
+
 void write_state(Hdf5Output& file, const SimulationState& state) {
   const std::size_t bodies = state.states.size();
   const std::vector<std::uint64_t> step = {state.step};
   file.add("/state/step", {1}, step);
-  write_rows(file, std::span(state.states));
+  write_rows(file, kBodies, state.states);
   file.add("/state/quiet_seconds", {bodies}, state.quiet);
   file.add("/state/sleeping_group", {bodies}, state.groups);
-  write_rows(file, std::span(state.contacts));
-  write_rows(file, std::span(state.posed));
+  write_rows(file, kContacts, state.contacts);
+  write_rows(file, kPosed, state.posed);
+  write_rows(file, kBefore, state.ahead.before);
+  write_rows(file, kApart, state.ahead.apart);
 }
 
 SimulationState read_state(const Hdf5Input& file, const std::string& path, std::size_t bodies) {
   SimulationState state;
-  const bool alike = read_rows(file, state.states);
+  const bool alike = read_rows(file, kBodies, state.states) && read_rows(file, kBefore, state.ahead.before);
   const auto step = file.read_u64("/state/step");
   state.quiet = file.read_f64("/state/quiet_seconds");
   state.groups = file.read_u32("/state/sleeping_group");
-  if (!read_rows(file, state.contacts))
-    throw FileError(path + ": /state/contacts: datasets of different lengths");
-  if (!read_rows(file, state.posed)) throw FileError(path + ": /state/pairs: datasets of different lengths");
+  const auto read_pairs = [&](const char* folder, auto& rows) {
+    if (!read_rows(file, folder, rows))
+      throw FileError(path + ": " + folder + ": datasets of different lengths");
+    for (const auto& row : rows) {
+      if (row.pair.a >= row.pair.b || row.pair.b >= bodies)
+        throw FileError(path + ": " + folder + "/pair: not two bodies of the run, the lower first");
+    }
+    if (!std::ranges::is_sorted(rows, {}, [](const auto& row) { return row.pair; }))
+      throw FileError(path + ": " + folder + "/pair: not ascending");
+    require_finite(path, folder, rows);
+  };
+  read_pairs(kContacts, state.contacts);
+  read_pairs(kPosed, state.posed);
+  read_pairs(kApart, state.ahead.apart);
+  const std::size_t before = state.ahead.before.size();  // none where no contacts ahead are looked for
   const bool fits = alike && step.size() == 1 && state.states.size() == bodies &&
-                    state.quiet.size() == bodies && state.groups.size() == bodies;
+                    (before == bodies || before == 0) && state.quiet.size() == bodies &&
+                    state.groups.size() == bodies;
   if (!fits) throw FileError(path + ": /state: not of " + std::to_string(bodies) + " bodies");
-  for (const CachedContact& contact : state.contacts) {
-    if (contact.pair.a >= contact.pair.b || contact.pair.b >= bodies)
-      throw FileError(path + ": /state/contacts/pair: not two bodies of the run, the lower first");
-  }
-  if (!std::ranges::is_sorted(state.contacts, {}, &CachedContact::pair))
-    throw FileError(path + ": /state/contacts/pair: not ascending");
-  require_finite(path, std::span<const BodyState>(state.states));
-  require_finite(path, std::span<const CachedContact>(state.contacts));
-  require_finite(path, std::span<const PosedBodies>(state.posed));
+  require_finite(path, kBodies, state.states);
+  require_finite(path, kBefore, state.ahead.before);
   state.step = step[0];
   return state;
 }
@@ -300,7 +325,7 @@ void write_run(const std::string& path, const RunDescription& run, const RunResu
   file.attribute("steps", std::uint64_t{results.records.size()});
   file.attribute("triangles", run.triangles);
   write_bodies(file, run);
-  write_rows(file, std::span(results.records));
+  write_rows(file, kFrames, results.records);
   write_trajectory(file, results.trajectory, run.bodies.size());
   write_state(file, results.state);
   file.write();
@@ -310,7 +335,8 @@ RunResults read_run(const std::string& path, const RunDescription& expected) {
   const Hdf5Input file(path);
   check_options(file, path, expected.options);
   RunResults results;
-  if (!read_rows(file, results.records)) throw FileError(path + ": /frames: datasets of different lengths");
+  if (!read_rows(file, kFrames, results.records))
+    throw FileError(path + ": /frames: datasets of different lengths");
   if (file.has("/trajectory")) results.trajectory = read_trajectory(file, path, expected.bodies.size());
   results.state = read_state(file, path, expected.bodies.size());
   if (results.records.size() != results.state.step) {

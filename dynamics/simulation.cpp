@@ -98,7 +98,7 @@ void Simulation::find_contacts(StepRecord& record) {
   if (parts_.ahead) {
     parts_.ahead->find_near(ahead);
     record.broad_phase += stopwatch.lap();
-    known = parts_.ahead->find_in_middle(touching, ahead);
+    known = parts_.ahead->find_in_middle(cache_.entries(), ahead);
     add(record, parts_.ahead->report());
     std::vector<ObjectPair> all;
     std::ranges::set_union(touching, parts_.ahead->slow(), std::back_inserter(all));

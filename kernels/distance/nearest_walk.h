@@ -96,16 +96,16 @@ struct PairsBelow {
 
 /// The means of a variant are made of a task and bring: Bound, a number type; bounds(a, b, limit, other,
 /// out): the bounds of all node pairs, and the masks of those below both limits, imaginary nodes never;
-/// limit(distance), distance(bound), see box_distance.h; far_along(batch, direction, distance): which of the first kNearBatch
-/// pairs of triangles, any where there are fewer, are surely at least so far apart along the direction; and
-/// bound(batch, out) of them.
+/// limit(distance), distance(bound), see box_distance.h; far_along(batch, direction, distance): which of the
+/// first kNearBatch pairs of triangles, any where there are fewer, are surely at least so far apart along the
+/// direction; and bound(batch, out) of them.
 template <typename Means>
 class NearestWalk {
  public:
   NearestWalk(const NearestTask& task, NearestSoFar& state) : task_(task), state_(state), means_(task) {}
 
   void run(const BoundedBlockPair* from, std::uint32_t count) {
-    take_limits();
+    take_limit();
     if (state_.found) wait_in_order();
     std::uint32_t next = 0;
     while (next < count && goes_on() && is_within_limits()) {
@@ -127,23 +127,17 @@ class NearestWalk {
     return visits_ < state_.most_visits && state_.bounded < state_.most_bounded;
   }
 
-  void take_limits() {
-    limit_ = means_.limit(nearness(task_, state_));
-    limit_without_tolerance_ = means_.limit(state_.upper);
-  }
-
-  /// Entries with this bound count no longer.
-  void pass_over(Bound bound) {
-    if (bound < limit_without_tolerance_) passed_over_ = std::min(passed_over_, bound);
-  }
+  void take_limit() { limit_ = means_.limit(nearness(task_, state_)); }
 
   void visit(const BoundedBlockPair& taken) {
-    const BoundedBlockPair pair = taken;  // the stack changes below
-    if (!(static_cast<Bound>(pair.bound) < limit_)) return pass_over(static_cast<Bound>(pair.bound));
+    const BoundedBlockPair pair = taken;               // the stack changes below
+    if (!(static_cast<Bound>(pair.bound) < limit_)) {  // it counts no longer
+      passed_over_ = std::min(passed_over_, static_cast<Bound>(pair.bound));
+      return;
+    }
     const Block &a = task_.a->tree.blocks[pair.a], &b = task_.b->tree.blocks[pair.b];
     alignas(64) Bound bound[16];
-    const PairsBelow below =
-        means_.bounds(a, b, limit_, std::min(limit_without_tolerance_, passed_over_), bound);
+    const PairsBelow below = means_.bounds(a, b, limit_, passed_over_, bound);
     ++state_.counters.block_pairs;
     ++visits_;
     std::uint32_t hits = below.limit & pair.mask;
@@ -252,13 +246,13 @@ class NearestWalk {
         add_candidate({found.lower[i], found.upper[i], near_.a[i], near_.b[i]}, state_);
     }
     near_.drop(count);
-    take_limits();
+    take_limit();
   }
 
   const NearestTask& task_;
   NearestSoFar& state_;
   const Means means_;
-  Bound limit_, limit_without_tolerance_;
+  Bound limit_;  ///< pairs of blocks with this bound count no longer
   Bound passed_over_ = std::numeric_limits<Bound>::infinity();  ///< the least bound of what is passed over
   NearBatch leaves_, near_;
   WaitingPairs waiting_;

@@ -47,9 +47,8 @@ ObjectDistance DistanceSearch::finish(const NearestTask& task, double reach) {
   ObjectDistance out = {};
   out.triangle_a = out.triangle_b = out.face_a = out.face_b = kNoIndex;
   // Pairs of triangles that did not count are not nearer than the upper bound of then, or are beyond
-  // reach. Where nothing is within reach, all was passed over.
-  const bool all_passed_over = !found.found && found.floor < INFINITY;
-  out.lower = all_passed_over ? found.floor : std::min(found.floor, found.upper);
+  // reach.
+  out.lower = std::min(found.floor, found.upper);
   out.upper = INFINITY;
   if (found.triangle_a == kNoIndex || out.lower > reach) return out;
   out.upper = found.found ? std::min(found.best.interval.upper, found.upper) : found.best.interval.upper;

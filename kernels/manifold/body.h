@@ -72,6 +72,8 @@ struct BodyPair {
 
   TANDEM_HD const Body& operator[](int side) const { return side == 0 ? a : b; }
   TANDEM_HD double reach() const { return std::fmax(a.reach, b.reach); }
+  /// A point that moves with the bodies, whichever of them is a.
+  TANDEM_HD Vector3 middle() const { return 0.5 * (a.centre + b.centre); }
   TANDEM_HD double smaller_diagonal() const { return std::fmin(a.shape->diagonal, b.shape->diagonal); }
   /// Points so far beside a plane count as in it: some hundred times what rounding of posed points and of
   /// their distance amounts to.

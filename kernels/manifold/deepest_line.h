@@ -106,9 +106,11 @@ class DeepestLine {
   TANDEM_HD void learn(int side, const Crossing& surface, HalfSpace& out) const;
   /// Forgets half-spaces beyond which the bodies go on, up to these heights on a line.
   TANDEM_HD void go_beyond(const Vector2& at, const double (&height)[2]) {
-    not_convex_ =
-        shared_.spaces.drop_before(team_, at, height, 16 * bodies_.tolerance(), beyond_rounding()) ||
-        not_convex_;
+    not_convex_ = shared_.spaces.drop_before(team_, at, height, rounding(), beyond_rounding()) || not_convex_;
+  }
+  /// Points are before a plane if they are so by more than this: lines are moved off edges by less.
+  TANDEM_HD double rounding() const {
+    return greater(16 * bodies_.tolerance(), 10 * kOffEdge * bodies_.smaller_diagonal());
   }
   /// Faces of float32 corners, which are not quite flat, go on beyond each other by less than this.
   TANDEM_HD double beyond_rounding() const { return kNearEnd * bodies_.smaller_diagonal(); }
@@ -148,13 +150,13 @@ TANDEM_HD void DeepestLine<Team>::find_places(const Team& team, const PieceMemor
   for (int i = 0;; ++i) {
     if (team.rank() == 0) out.at[i] = next.at, out.beside[i] = next.piece, out.count = i + 1;
     if (i + 1 == wanted) break;
-    if (i == 1) along = next.at - first;
-    if (i == 2) across = cross(cross(along, next.at - first), along);
+    if (i == 1) along = normalized(next.at - first);
+    if (i == 2) across = -reach * normalized(cross(cross(along, next.at - first), along));
     next = places.furthest_place(begin, end, reach, [&](const Vector3& x) {
       const Vector3 from = x - first;
       if (i == 0) return dot(from, from);
       const Vector3 off = cross(along, from);
-      return i == 1 ? dot(off, off) : -dot(across, from);
+      return i == 1 ? dot(off, off) : dot(across, from);
     });
   }
   team.sync();
@@ -204,7 +206,7 @@ TANDEM_HD void DeepestLine<Team>::begin_with_seeds(const PatchFrame& frame, doub
     for (int i = 0; i < count; ++i) {
       const LineQuestion &top = line[2 * i], &bottom = line[2 * i + 1];
       if (!top.best.found() || !bottom.best.found()) continue;
-      if (!(top.best.height - bottom.best.height > shared_.best.depth())) continue;
+      if (!(top.best.height - bottom.best.height > shared_.best.depth() * (1 + kTied))) continue;
       shared_.best = {
           {top.best.triangle, bottom.best.triangle}, top.at, {top.best.height, bottom.best.height}};
       shared_.from = i;
@@ -269,8 +271,8 @@ TANDEM_HD void DeepestLine<Team>::begin_half_spaces(const Vector3& middle, doubl
     const Vector2 flat = frame.flat(middle);
     const double half = one_region_ ? far : reach;
     shared_.steps = 0;
-    shared_.spaces.begin(flat, frame.flat(shared_.seeds.at[shared_.from]) - flat, half,
-                         std::fabs(frame.height(middle)) + far);
+    shared_.spaces.begin(flat, frame.flat(shared_.seeds.at[shared_.from]) - flat, half, frame.height(middle),
+                         far);
   }
   static_assert(HalfSpaces::kFirst == 4 * kMostSeeds);
   const int count = 4 * shared_.seeds.count;
@@ -449,8 +451,7 @@ TANDEM_HD void DeepestLine<Team>::search_from_seeds(const double& enough) {
     const int seed = i == 0 ? deepest : i <= deepest ? i - 1 : i;
     const Vector3& from = shared_.seeds.at[seed];
     // Where faces of both bodies lie in each other, it may be no point within them.
-    if (shared_.spaces.in_plane(team_, shared_.frame.flat(from), shared_.frame.height(from),
-                                16 * bodies_.tolerance()))
+    if (shared_.spaces.in_plane(team_, shared_.frame.flat(from), shared_.frame.height(from), rounding()))
       continue;
     improve(seed, kMostSteps, enough);
   }
@@ -505,7 +506,7 @@ TANDEM_HD bool DeepestLine<Team>::refutes_half_spaces() const {
   TANDEM_ROLLED
   for (int i = 0; i < kBeside; ++i) {
     if (!overlaps(i) || !(line[2 * i].best.height - line[2 * i + 1].best.height > depth)) continue;
-    depth = line[2 * i].best.height - line[2 * i + 1].best.height, deepest = i;
+    depth = (line[2 * i].best.height - line[2 * i + 1].best.height) * (1 + kTied), deepest = i;
   }
   bool goes_on = false;
   TANDEM_ROLLED

@@ -38,12 +38,12 @@ class HalfSpaces {
   TANDEM_HD HalfSpace& learnt(int i) { return space[kFirst + i % kLearnt]; }
 
   /// One of the team begins. middle, along, half: the square's middle, the direction of two sides, half their
-  /// length; far: heights are between -far and far.
-  TANDEM_HD void begin(const Vector2& middle, const Vector2& along, double half, double far) {
+  /// length; height, far: heights are no further than `far` from this one.
+  TANDEM_HD void begin(const Vector2& middle, const Vector2& along, double half, double height, double far) {
     const double size = norm(along);
     along_ = size > 0 ? (1 / size) * along : Vector2{1, 0};
     for (int i = 0; i < 4; ++i) wall_[i] = dot(wall(i), middle) + half;
-    wall_[4] = wall_[5] = far;
+    wall_[4] = far + height, wall_[5] = far - height;
     begin_basis();
   }
 

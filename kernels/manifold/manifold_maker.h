@@ -3,7 +3,7 @@
 #include "kernels/manifold/patch_rim.h"
 #include "kernels/manifold/patch_sheets.h"
 
-/// The rule by which contacts become manifolds (docs/contacts.md), for CPU and GPU alike.
+/// The rule by which contacts become manifolds (docs/manifold_method.md), for CPU and GPU alike.
 namespace tandem::manifold {
 
 /// A line that sounds the depth at the rim is moved inwards by this part of the way to the middle, so that it
@@ -183,8 +183,8 @@ TANDEM_HD void ManifoldMaker<Team>::begin(std::uint32_t region, bool first_depth
     take_normal(measure, normal_finder.find(measure));
   }
   const bool is_deep = state_.kind == PatchKind::deep;
-  const int lines = is_deep ? normal_finder.gather_for_deep(search.measure) : 1;
   const double reach = is_deep ? normal_finder.reach_from(search.measure.middle) : 0;
+  const int lines = is_deep ? normal_finder.gather_for_deep(search.measure, reach) : 1;
   if (team_.rank() == 0) {
     search.middle = search.measure.middle, search.reach = reach;
     search.both_ways = is_deep && shared.normal.both_ways;
@@ -472,9 +472,11 @@ TANDEM_HD void ManifoldMaker<Team>::place_sheets(ChoiceMemory& shared) const {
 template <typename Team>
 TANDEM_HD void ManifoldMaker<Team>::keep_apart(int most_of_rim, ChoiceMemory& shared) const {
   int order[kMostCandidates] = {}, count = 0, kept = 0;
+  const double tied = kTied * greater(state_.deepest.depth(), state_.reach);
   const auto before = [&](int i, int j) {
     const Chosen &x = shared.candidate[i], &y = shared.candidate[j];
-    return x.depth > y.depth || (x.depth == y.depth && x.from_middle > y.from_middle);
+    const double deeper = x.depth - y.depth;
+    return deeper > tied || (deeper >= -tied && x.from_middle - y.from_middle > tied);
   };
   const auto insert = [&](int i) {  // stable
     int j = count++;

@@ -13,8 +13,17 @@ inline constexpr double kNearEnd = 1e-6;
 /// decides.
 inline constexpr double kOffEnd = 0x1p-10;
 
-/// A place on a curve. It is found by its coordinates, not by numbers of triangles, so it hardly depends on
-/// how the surfaces are cut into triangles.
+/// Values that differ by no more than this part of them are equal but for rounding, as distances of the
+/// corners of a rectangle from its middle. Numbers of triangles decide between them, or bodies that are
+/// turned together would have other manifolds.
+inline constexpr double kTied = 1e-9;
+
+/// Adding this number to one of about 1 and taking it off again leaves some 30 bits behind the point, so that
+/// values that are equal but for rounding become equal.
+inline constexpr double kCoarse = 0x1p22;
+
+/// A place on a curve. It is found by its coordinates, and by numbers of triangles only between equal ones,
+/// so it hardly depends on how the surfaces are cut into triangles.
 struct Place {
   Vector3 at;
   std::uint32_t piece;
@@ -29,35 +38,34 @@ class CurvePlaces {
   /// Returns the place that is nearest to a point. reach: of the pieces.
   TANDEM_HD Place nearest_place(std::uint32_t begin, std::uint32_t end, const Vector3& from,
                                 double reach) const {
-    std::uint32_t piece[1];
-    least_pieces(begin, end, piece, [&](const Piece& of, double(&value)[1]) {
+    const std::uint32_t piece = least_piece(begin, end, reach, [&](const Piece& of) {
       const Vector3 apart = nearest_on(of, from, kOffEnd * reach) - from;
-      value[0] = dot(apart, apart);
+      return dot(apart, apart);
     });
-    return {nearest_on(memory_.pieces[piece[0]], from, kOffEnd * reach), piece[0]};
+    return {nearest_on(memory_.pieces[piece], from, kOffEnd * reach), piece};
   }
-  /// Returns the place that has most of a convex function. That is an end of a piece, and none between pieces
-  /// into which a straight one is cut.
+  /// Returns the place that has most of a convex function, which grows as squares of distances do. That is an
+  /// end of a piece, and none between pieces into which a straight one is cut.
   template <typename Value>
   TANDEM_HD Place furthest_place(std::uint32_t begin, std::uint32_t end, double reach,
                                  const Value& value) const {
-    std::uint32_t piece[1];
     Vector3 p, q;
-    least_pieces(begin, end, piece, [&](const Piece& of, double(&least)[1]) {
+    const std::uint32_t piece = least_piece(begin, end, reach, [&](const Piece& of) {
       ends_of(of, reach, p, q);
-      least[0] = -greater(value(p), value(q));
+      return -greater(value(p), value(q));
     });
-    ends_of(memory_.pieces[piece[0]], reach, p, q);
-    return {value(p) >= value(q) ? p : q, piece[0]};
+    ends_of(memory_.pieces[piece], reach, p, q);
+    return {value(p) >= value(q) - kTied * reach * reach ? p : q, piece};
   }
   /// Returns the point of a piece that is nearest to another one and not too near to its ends.
   TANDEM_HD static Vector3 nearest_on(const Piece& piece, const Vector3& from, double off_end);
 
  private:
-  /// Finds the pieces of least values; of several that of the least triangles. values_of(piece, values).
-  template <int kCount, typename ValuesOf>
-  TANDEM_HD void least_pieces(std::uint32_t begin, std::uint32_t end, std::uint32_t (&out)[kCount],
-                              const ValuesOf& values_of) const;
+  /// Returns the piece of the least value; of several that are equal but for rounding, that of the least
+  /// triangles.
+  template <typename Value>
+  TANDEM_HD std::uint32_t least_piece(std::uint32_t begin, std::uint32_t end, double reach,
+                                      const Value& value) const;
 
   /// The ends of a piece, but for a little.
   TANDEM_HD static void ends_of(const Piece& piece, double reach, Vector3& p, Vector3& q) {
@@ -132,33 +140,22 @@ TANDEM_HD Vector3 CurvePlaces<Team>::nearest_on(const Piece& piece, const Vector
 }
 
 template <typename Team>
-template <int kCount, typename ValuesOf>
-TANDEM_HD void CurvePlaces<Team>::least_pieces(std::uint32_t begin, std::uint32_t end,
-                                               std::uint32_t (&out)[kCount],
-                                               const ValuesOf& values_of) const {
-  double least[kCount], value[kCount];
-  LeastPiece own[kCount];
-  for (double& of : least) of = INFINITY;
+template <typename Value>
+TANDEM_HD std::uint32_t CurvePlaces<Team>::least_piece(std::uint32_t begin, std::uint32_t end, double reach,
+                                                       const Value& value) const {
+  const double coarse = kCoarse * reach * reach;
+  double least = INFINITY;
+  LeastPiece own;
   for (std::uint32_t i = begin + team_.rank(); i < end; i += team_.size()) {
     const std::uint32_t piece = memory_.order[i];
-    values_of(memory_.pieces[piece], value);
-    const std::uint64_t key = memory_.pieces[piece].symmetric_key();
-    for (int k = 0; k < kCount; ++k) {
-      if (value[k] > least[k]) continue;
-      if (value[k] < least[k]) least[k] = value[k], own[k] = {};
-      own[k].take(key, piece);
-    }
+    const double about = (value(memory_.pieces[piece]) + coarse) - coarse;
+    if (about > least) continue;
+    if (about < least) least = about, own = {};
+    own.take(memory_.pieces[piece].symmetric_key(), piece);
   }
-  std::uint64_t key[kCount];
-  for (int k = 0; k < kCount; ++k) value[k] = least[k];
-  team_.least_ones(least);
-  for (int k = 0; k < kCount; ++k) {
-    if (value[k] != least[k]) own[k] = {};
-    key[k] = own[k].key;
-  }
-  team_.least_ones(key);
-  for (int k = 0; k < kCount; ++k) out[k] = own[k].key == key[k] ? own[k].piece : kNoIndex;
-  team_.least_ones(out);
+  if (team_.least(least) != least) own = {};
+  const std::uint64_t key = team_.least(own.key);
+  return team_.least(own.key == key ? own.piece : kNoIndex);
 }
 
 template <typename Team>
@@ -167,9 +164,10 @@ TANDEM_HD std::uint32_t OverlapLines<Team>::go_inside(int count, double most, st
   team_.sync();
   for (int i = static_cast<int>(team_.rank()); i < count; i += static_cast<int>(team_.size())) {
     const Place& place = shared_.place[i];
-    const float* n = memory_.normals + 6 * std::size_t{place.piece};
-    const Vector3 sum = {-double{n[0]} - double{n[3]}, -double{n[1]} - double{n[4]},
-                         -double{n[2]} - double{n[5]}};
+    const Piece& of = memory_.pieces[place.piece];
+    // The normals that pieces have are rounded to float32, in another way where the bodies are turned.
+    const Vector3 sum =
+        -(bodies_.a.triangle(of.triangle[0]).normal + bodies_.b.triangle(of.triangle[1]).normal);
     const double length = norm(sum);
     const auto line = asked + 2 * static_cast<std::uint32_t>(i);
     PatchFrame& frame = shared_.frame[line / 2];
@@ -178,7 +176,6 @@ TANDEM_HD std::uint32_t OverlapLines<Team>::go_inside(int count, double most, st
       shared_.line[line].side = shared_.line[line + 1].side = -1;
       continue;
     }
-    const Piece& of = memory_.pieces[place.piece];
     Vector3 from = place.at;
     if (of.kind() == MeetingKind::polygon) {
       Meeting meeting;

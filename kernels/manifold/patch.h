@@ -137,20 +137,23 @@ struct RimValue {
   }
 };
 
-/// The candidate that has most of something.
+/// Candidates whose values differ by less than this part have equal ones, but for float32 rounding.
+inline constexpr float kTiedOnRim = 0x1p-12f;
+
+/// The candidate that has most of something: of those whose values are equal but for rounding, the one whose
+/// triangles come first.
 struct Furthest {
-  float value;
+  float value;  ///< the greatest; before one is found, what it has to be greater than
   std::uint32_t reference;
 
   TANDEM_HD static std::uint64_t key(const PieceMemory& memory, std::uint32_t reference) {
     const Piece& p = memory.pieces[reference / 8];
     return std::uint64_t{p.triangle[0]} << 33 | std::uint64_t{p.triangle[1]} << 3 | (reference & 7u);
   }
-  /// Takes the candidate if its value is greater; of equal ones, the one whose triangles come first.
-  TANDEM_HD void take(const PieceMemory& memory, float of_c, std::uint32_t of) {
-    if (!(of_c >= value)) return;
-    if (of_c == value && (reference == kNoIndex || key(memory, of) >= key(memory, reference))) return;
-    value = of_c, reference = of;
+  /// Values of this or more come into question, if the greatest is known and more than what was given.
+  TANDEM_HD float limit() const { return value - kTiedOnRim * std::fabs(value); }
+  TANDEM_HD void take(const PieceMemory& memory, std::uint32_t of) {
+    if (reference == kNoIndex || key(memory, of) < key(memory, reference)) reference = of;
   }
 };
 

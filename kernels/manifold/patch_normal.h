@@ -50,7 +50,8 @@ class NormalFinder {
   /// Gathers in NormalMemory::tried the directions along which a deep patch may push: that of the area
   /// vector, or of the triangles of sheets, and normals of faces of both bodies. Result: how many. Where the
   /// area says which way a patch pushes, they point that way; else NormalMemory::both_ways is true.
-  TANDEM_HD_CALLED int gather_for_deep(const CurveMeasure& curve);
+  /// reach: of the curve, from its middle.
+  TANDEM_HD_CALLED int gather_for_deep(const CurveMeasure& curve, double reach);
 
   /// Returns the distance of the piece's end that is furthest from a point.
   TANDEM_HD_CALLED double reach_from(const Vector3& middle) const;
@@ -75,7 +76,7 @@ class NormalFinder {
   TANDEM_HD bool has_many_directions(int side) const;
   TANDEM_HD LeastPiece least_unmarked(int side, const FloatVector& known) const;
   TANDEM_HD bool gather_directions(int side, bool keep_if_many);
-  TANDEM_HD_CALLED Vector3 longest_line(const Vector3& middle) const;
+  TANDEM_HD_CALLED Vector3 longest_line(const Vector3& middle, double reach) const;
   TANDEM_HD_CALLED void gather_unlike(int side, const Vector3& line, const Vector3& push);
   TANDEM_HD void find_faces_along(const Vector3& smooth, std::uint32_t (&holder)[2]) const;
   TANDEM_HD void sum_lengths_on_faces(const FloatVector (&face)[2], const std::uint32_t (&holder)[2],
@@ -604,13 +605,13 @@ TANDEM_HD_CALLED void NormalFinder<Team>::gather_unlike(int side, const Vector3&
 }
 
 template <typename Team>
-TANDEM_HD_CALLED int NormalFinder<Team>::gather_for_deep(const CurveMeasure& curve) {
+TANDEM_HD_CALLED int NormalFinder<Team>::gather_for_deep(const CurveMeasure& curve, double reach) {
   directions_ = 0;
   const Vector3 own = curve.push();
   const bool counts = dot(own, own) > 0;
   const bool joined = memory_.pieces[memory_.order[begin_]].joined != 0;
   const bool both_ways = joined || summary_.degenerate || !counts || !curve.by_area || surrounds_hole_;
-  const Vector3 line = longest_line(curve.middle), push = both_ways ? Vector3{} : own;
+  const Vector3 line = longest_line(curve.middle, reach), push = both_ways ? Vector3{} : own;
   gather_unlike(0, line, push);
   gather_unlike(1, line, push);
   int count = 0;
@@ -632,22 +633,12 @@ TANDEM_HD_CALLED int NormalFinder<Team>::gather_for_deep(const CurveMeasure& cur
 
 /// Returns the way from the middle of the pieces to the furthest of their ends.
 template <typename Team>
-TANDEM_HD_CALLED Vector3 NormalFinder<Team>::longest_line(const Vector3& middle) const {
-  const auto way = [&](const Piece& piece) {
-    const Vector3 p = piece.end[0] - middle, q = piece.end[1] - middle;
-    return piece.kind() == MeetingKind::polygon || dot(p, p) >= dot(q, q) ? p : q;
-  };
-  double most = -1;
-  LeastPiece own;
-  for (std::uint32_t i = begin_ + team_.rank(); i < end_; i += team_.size()) {
-    const std::uint32_t at = memory_.order[i];
-    const Vector3 from = way(memory_.pieces[at]);
-    if (dot(from, from) > most) most = dot(from, from), own = {};
-    if (dot(from, from) == most) own.take(memory_.pieces[at].key(), at);
-  }
-  if (team_.greatest(most) != most) own = {};
-  const std::uint64_t key = team_.least(own.key);
-  const Vector3 out = way(memory_.pieces[team_.least(own.key == key ? own.piece : kNoIndex)]);
+TANDEM_HD_CALLED Vector3 NormalFinder<Team>::longest_line(const Vector3& middle, double reach) const {
+  const Place furthest =
+      CurvePlaces<Team>(team_, memory_).furthest_place(begin_, end_, reach, [&](const Vector3& x) {
+        return dot(x - middle, x - middle);
+      });
+  const Vector3 out = furthest.at - middle;
   return norm(out) > 0 ? normalized(out) : Vector3{0, 0, 1};
 }
 

@@ -355,31 +355,33 @@ TANDEM_INLINE Lanes4 value_of(const manifold::RimValue& value, const FourCandida
   return value.distance ? x * x + y * y : (q.y - p.y) * x - (q.x - p.x) * y;
 }
 
-/// RimFinder::furthest(). First the values, then who has the greatest.
+/// RimFinder::furthest(). First the greatest values, then who has them.
 void furthest(const manifold::PieceMemory& memory, const manifold::Candidate* candidates, std::uint32_t count,
               const manifold::RimValue* values, int wanted, manifold::Furthest* best) {
-  constexpr std::uint32_t kAtOnce = 256;
-  for (std::uint32_t from = 0; from < count; from += kAtOnce) {
-    const std::uint32_t end = count - from < kAtOnce ? count : from + kAtOnce;
-    Lanes4 value[2][kAtOnce / 4], most[2];
-    for (int w = 0; w < wanted; ++w) most[w].v = Lanes4::Floats{} + best[w].value;
-    std::uint32_t groups = 0;
-    for (std::uint32_t i = from; i < end; i += 4, ++groups) {
-      const FourCandidates four(candidates, i, count);
-      for (int w = 0; w < wanted; ++w) {
-        value[w][groups] = value_of(values[w], four);
-        most[w] = larger(most[w], value[w][groups]);
-      }
-    }
+  constexpr std::uint32_t kKept = 64;  // values of so many groups need not be computed again
+  Lanes4 most[2], kept[2][kKept];
+  for (int w = 0; w < wanted; ++w) most[w].v = Lanes4::Floats{} + best[w].value;
+  const std::uint32_t groups = (count + 3) / 4;
+  for (std::uint32_t group = 0; group < groups; ++group) {
+    const FourCandidates four(candidates, 4 * group, count);
     for (int w = 0; w < wanted; ++w) {
-      float greatest = most[w].v[0];
-      for (int k = 1; k < 4; ++k) greatest = manifold::greater(greatest, most[w].v[k]);
-      for (std::uint32_t group = 0; group < groups; ++group) {
-        unsigned found = LaneMask<4>{value[w][group].v == greatest}.mask();
-        for (; found != 0; found &= found - 1) {
-          const std::uint32_t i = from + 4 * group + static_cast<std::uint32_t>(std::countr_zero(found));
-          if (i < count) best[w].take(memory, greatest, candidates[i].reference);
-        }
+      const Lanes4 value = value_of(values[w], four);
+      if (group < kKept) kept[w][group] = value;
+      most[w] = larger(most[w], value);
+    }
+  }
+  for (int w = 0; w < wanted; ++w) {
+    float greatest = most[w].v[0];
+    for (int k = 1; k < 4; ++k) greatest = manifold::greater(greatest, most[w].v[k]);
+    if (!(greatest > best[w].value)) continue;
+    best[w].value = greatest;
+    for (std::uint32_t group = 0; group < groups; ++group) {
+      const Lanes4 value =
+          group < kKept ? kept[w][group] : value_of(values[w], FourCandidates(candidates, 4 * group, count));
+      unsigned found = LaneMask<4>{value.v >= best[w].limit()}.mask();
+      for (; found != 0; found &= found - 1) {
+        const std::uint32_t i = 4 * group + static_cast<std::uint32_t>(std::countr_zero(found));
+        if (i < count) best[w].take(memory, candidates[i].reference);
       }
     }
   }

@@ -123,24 +123,30 @@ TANDEM_HD bool RimFinder<Team>::middle_of_area(Vector2& middle) const {
   return true;
 }
 
-/// Finds for each value the candidate that has the greatest one, if it is greater than what is given; of
-/// several, the one whose triangles come first.
+/// Finds for each value the candidate that has the greatest one, if it is greater than what is given.
 template <typename Team>
 template <int kWanted>
 TANDEM_HD void RimFinder<Team>::furthest(const RimValue (&values)[kWanted], Furthest (&best)[kWanted]) const {
   if constexpr (HasLanes<Team>)
     return team_.lanes().furthest(memory_, candidates(), count_, values, kWanted, best);
-  for (std::uint32_t i = team_.rank(); i < count_; i += team_.size()) {
-    const Candidate& c = candidates()[i];
-    for (int k = 0; k < kWanted; ++k) best[k].take(memory_, values[k](c), c.reference);
-  }
-  if (Team::size() == 1) return;
   float greatest[kWanted];
   for (int k = 0; k < kWanted; ++k) greatest[k] = best[k].value;
+  for (std::uint32_t i = team_.rank(); i < count_; i += team_.size()) {
+    for (int k = 0; k < kWanted; ++k) greatest[k] = greater(values[k](candidates()[i]), greatest[k]);
+  }
   team_.greatest_ones(greatest);
+  bool any[kWanted];
+  for (int k = 0; k < kWanted; ++k) any[k] = greatest[k] > best[k].value, best[k].value = greatest[k];
+  for (std::uint32_t i = team_.rank(); i < count_; i += team_.size()) {
+    const Candidate& c = candidates()[i];
+    for (int k = 0; k < kWanted; ++k) {
+      if (any[k] && values[k](c) >= best[k].limit()) best[k].take(memory_, c.reference);
+    }
+  }
+  if (Team::size() == 1) return;
   std::uint64_t own[kWanted], least[kWanted];
   for (int k = 0; k < kWanted; ++k) {
-    const bool mine = best[k].reference != kNoIndex && best[k].value == greatest[k];
+    const bool mine = best[k].reference != kNoIndex;
     least[k] = own[k] = mine ? Furthest::key(memory_, best[k].reference) : ~std::uint64_t{0};
   }
   team_.least_ones(least);
@@ -148,7 +154,7 @@ TANDEM_HD void RimFinder<Team>::furthest(const RimValue (&values)[kWanted], Furt
   for (int k = 0; k < kWanted; ++k)
     reference[k] = own[k] != ~std::uint64_t{0} && own[k] == least[k] ? best[k].reference : kNoIndex;
   team_.least_ones(reference);
-  for (int k = 0; k < kWanted; ++k) best[k] = {greatest[k], reference[k]};
+  for (int k = 0; k < kWanted; ++k) best[k].reference = reference[k];
 }
 
 template <typename Team>
@@ -192,7 +198,7 @@ TANDEM_HD void RimFinder<Team>::find(int most, const Vector2& middle, RimMemory&
       shared.of_side[first] = found[0], shared.of_side[second] = found[1];
       int side = 0;
       for (int i = 1; i < rim.points; ++i)
-        side = shared.of_side[i].value > shared.of_side[side].value ? i : side;
+        side = shared.of_side[i].limit() > shared.of_side[side].value ? i : side;
       const Furthest best = shared.of_side[side];
       shared.complete = !(best.value > limit);
       if (!shared.complete) {

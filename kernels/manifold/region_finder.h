@@ -67,12 +67,13 @@ class RegionFinder {
     const std::uint32_t p = first_of(i), q = first_of(j);
     joined_to(greater(p, q)) = lesser(p, q);
   }
-  /// The place of a curve that is nearest to the middle of all.
+  /// The place of a curve that is nearest to the middle of both bodies.
   TANDEM_HD Place place_in(std::uint32_t curve) const {
     const std::uint32_t piece = piece_of(curve);
-    return {CurvePlaces<Team>::nearest_on(memory_.pieces[piece], summary_.origin, kOffEnd * summary_.unit),
-            piece};
+    return {CurvePlaces<Team>::nearest_on(memory_.pieces[piece], bodies_.middle(), kOffEnd * reach()), piece};
   }
+  /// A length that stays the same where the bodies are moved together.
+  TANDEM_HD double reach() const { return bodies_.smaller_diagonal() / 2; }
   TANDEM_HD bool comes_first(std::uint32_t i, std::uint32_t than) const;
   TANDEM_HD std::uint32_t neighbour(std::uint32_t of, int k) const;
   TANDEM_HD bool is_joined(std::uint32_t i, std::uint32_t j);
@@ -93,7 +94,7 @@ TANDEM_HD bool RegionFinder<Team>::is_joined(std::uint32_t i, std::uint32_t j) {
   const OverlapLines<Team> lines(team_, bodies_, memory_, shared_->lines);
   const CurvePlaces<Team> places(team_, memory_);
   const auto nearest = [&](std::uint32_t curve, const Place& from) {
-    return places.nearest_place(memory_.start[curve], memory_.start[curve + 1], from.at, summary_.unit);
+    return places.nearest_place(memory_.start[curve], memory_.start[curve + 1], from.at, reach());
   };
   constexpr int kAttempts = 2;
   const Place first = place_in(i);
@@ -102,7 +103,7 @@ TANDEM_HD bool RegionFinder<Team>::is_joined(std::uint32_t i, std::uint32_t j) {
   for (int k = 0; k < kAttempts; ++k) {
     const Place from =
         k == 0 ? nearest(i, nearest(j, first))
-               : places.furthest_place(memory_.start[i], memory_.start[i + 1], summary_.unit,
+               : places.furthest_place(memory_.start[i], memory_.start[i + 1], reach(),
                                        [&](const Vector3& x) { return dot(x - first.at, x - first.at); });
     const Place to = nearest(j, from);
     if (team_.rank() == 0) shared_->lines.place[2 * k] = from, shared_->lines.place[2 * k + 1] = to;
@@ -180,8 +181,7 @@ TANDEM_HD std::uint32_t RegionFinder<Team>::sort_by_region() {
 template <typename Team>
 TANDEM_HD void RegionFinder<Team>::begin(std::uint32_t curve) {
   const std::uint32_t first = memory_.start[curve], end = memory_.start[curve + 1];
-  const Place place =
-      CurvePlaces<Team>(team_, memory_).nearest_place(first, end, summary_.origin, summary_.unit);
+  const Place place = CurvePlaces<Team>(team_, memory_).nearest_place(first, end, bodies_.middle(), reach());
   CurveSums sums;
   for (std::uint32_t i = first + team_.rank(); i < end; i += team_.size())
     sums.add(memory_, memory_.order[i], summary_.origin, 1 / summary_.unit);
@@ -224,12 +224,13 @@ TANDEM_HD std::uint32_t RegionFinder<Team>::neighbour(std::uint32_t of, int k) c
   }
 }
 
-/// Returns whether a curve is nearer to the middle of all than another one; of equally near ones that of the
-/// least triangles comes first.
+/// Returns whether a curve is nearer to the middle of both bodies than another one; of equally near ones that
+/// of the least triangles comes first.
 template <typename Team>
 TANDEM_HD bool RegionFinder<Team>::comes_first(std::uint32_t i, std::uint32_t than) const {
-  const Vector3 p = place_in(i).at - summary_.origin, q = place_in(than).at - summary_.origin;
-  if (dot(p, p) != dot(q, q)) return dot(p, p) < dot(q, q);
+  const Vector3 middle = bodies_.middle(), p = place_in(i).at - middle, q = place_in(than).at - middle;
+  const double of_p = dot(p, p), of_q = dot(q, q);
+  if (std::fabs(of_p - of_q) > kTied * of_q) return of_p < of_q;
   return memory_.pieces[piece_of(i)].symmetric_key() < memory_.pieces[piece_of(than)].symmetric_key();
 }
 

@@ -205,6 +205,9 @@ struct Findings {
 
 class Overlaps : public testing::TestWithParam<Body> {
  protected:
+  /// Calls visit(scene, size) with the body and each of the others, at random and near each other.
+  template <typename Visit>
+  static void for_each_overlap(int times, RandomPoses& random, const Visit& visit);
   static void look_at(const ManifoldScene& scene, double size, Findings& found);
 
  private:
@@ -216,6 +219,25 @@ class Overlaps : public testing::TestWithParam<Body> {
   static void look_at_one(const ManifoldScene& scene, const OverlapPiece& piece, const Manifold& m,
                           bool is_only_piece, Findings& found);
 };
+
+template <typename Visit>
+void Overlaps::for_each_overlap(int times, RandomPoses& random, const Visit& visit) {
+  for (const Body& other : bodies()) {
+    ManifoldScene scene;
+    scene.add_body(scene.add_shape(GetParam().mesh), kIdentityPose);
+    scene.add_body(scene.add_shape(other.mesh), kIdentityPose);
+    const AssetView a = scene.assets.views()[0], b = scene.assets.views()[1];
+    const double both = radius_of(a) + radius_of(b), size = std::min(radius_of(a), radius_of(b));
+    for (int trial = 0; trial < times; ++trial) {
+      SCOPED_TRACE(std::string(other.name) + " " + std::to_string(trial));
+      const Vector3 way =
+          rotate(any_motion(random, 0), {0, 0, both * std::pow(10, random.uniform(-1, -0.15))});
+      scene.bodies[0].pose = centred_at(a, any_motion(random, 0), {0, 0, 0});
+      scene.bodies[1].pose = centred_at(b, any_motion(random, 0), {way.x, way.y, way.z});
+      visit(scene, size);
+    }
+  }
+}
 
 /// The manifold is the only one of the piece.
 void Overlaps::look_at_one(const ManifoldScene& scene, const OverlapPiece& piece, const Manifold& m,
@@ -267,22 +289,10 @@ TEST_P(Overlaps, HaveAManifoldInEachPieceThatShrinksIt) {
   RandomPoses random(23);
   ASSERT_TRUE(bounds_a_solid(solid_of(GetParam().mesh, kIdentityPose)));
   Findings found;
-  for (const Body& other : bodies()) {
-    ManifoldScene scene;
-    scene.add_body(scene.add_shape(GetParam().mesh), kIdentityPose);
-    scene.add_body(scene.add_shape(other.mesh), kIdentityPose);
-    const AssetView a = scene.assets.views()[0], b = scene.assets.views()[1];
-    const double both = radius_of(a) + radius_of(b), size = std::min(radius_of(a), radius_of(b));
-    for (int trial = 0; trial < trials(10, 30); ++trial) {
-      SCOPED_TRACE(std::string(other.name) + " " + std::to_string(trial));
-      const Vector3 way =
-          rotate(any_motion(random, 0), {0, 0, both * std::pow(10, random.uniform(-1, -0.15))});
-      scene.bodies[0].pose = centred_at(a, any_motion(random, 0), {0, 0, 0});
-      scene.bodies[1].pose = centred_at(b, any_motion(random, 0), {way.x, way.y, way.z});
-      scene.find();
-      if (!scene.query.rows().empty()) look_at(scene, size, found);
-    }
-  }
+  for_each_overlap(trials(10, 30), random, [&](ManifoldScene& scene, double size) {
+    scene.find();
+    if (!scene.query.rows().empty()) look_at(scene, size, found);
+  });
   std::printf(
       "%s: %d pieces, %d without a manifold, %d with several, %d of another area; %d of %d manifolds lie "
       "beside; of %d pieces with one, its normal shrinks %d at once and %d in the end; %d of %d depths are "
@@ -297,6 +307,43 @@ TEST_P(Overlaps, HaveAManifoldInEachPieceThatShrinksIt) {
   EXPECT_GE(found.shrinks + found.ends, found.one - 1 - found.one / 25);
   EXPECT_LE(found.shallow, 1 + GetParam().most_shallow * found.straight);
   EXPECT_LE(found.half, 1 + found.one / 30);
+}
+
+/// Returns whether manifolds are those of another pose, moved, within a distance.
+bool are_moved(const ManifoldScene& scene, const std::vector<Manifold>& manifolds,
+               const std::vector<ManifoldPoint>& points, const Pose& motion, double distance) {
+  const auto now = scene.manifolds();
+  if (now.size() != manifolds.size()) return false;
+  for (std::size_t i = 0; i < now.size(); ++i) {
+    const Manifold &m = now[i], &before = manifolds[i];
+    if (m.flags != before.flags || m.point_count != before.point_count) return false;
+    if (std::fabs(m.depth - before.depth) > distance) return false;
+    if (norm(vector_of(m.normal) - rotate(motion, vector_of(before.normal))) > 1e-7) return false;
+    for (std::uint32_t k = 0; k < m.point_count; ++k) {
+      const Vector3 was = vector_of(points[before.first_point + k].position);
+      if (norm(vector_of(scene.points()[m.first_point + k].position) - apply(motion, was)) > distance)
+        return false;
+    }
+  }
+  return true;
+}
+
+TEST_P(Overlaps, KeepTheirManifoldsWhereBothBodiesAreMoved) {
+  RandomPoses random(77);
+  int scenes = 0, others = 0;
+  for_each_overlap(trials(100, 10), random, [&](ManifoldScene& scene, double size) {
+    scene.find();
+    if (scene.query.rows().empty()) return;
+    const std::vector<Manifold> manifolds(scene.manifolds().begin(), scene.manifolds().end());
+    const std::vector<ManifoldPoint> points(scene.points().begin(), scene.points().end());
+    const Pose motion = any_motion(random, size);
+    scene.find(motion);
+    ++scenes;
+    others += !are_moved(scene, manifolds, points, motion, 1e-9 * size);
+  });
+  std::printf("%s: %d of %d scenes have other manifolds\n", GetParam().name, others, scenes);
+  EXPECT_GT(scenes, 250);
+  EXPECT_LE(others, 1 + scenes / 250);
 }
 
 INSTANTIATE_TEST_SUITE_P(Bodies, Overlaps, testing::ValuesIn(bodies()),

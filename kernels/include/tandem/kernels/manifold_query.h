@@ -15,7 +15,7 @@ struct ManifoldOptions {
   std::uint32_t most_points =
       kMostManifoldPoints;  ///< of a manifold, from 1 to kMostManifoldPoints, else kBadOption
   /// Depths are those of lines through a few points of each overlap, so they may be too small: for bodies
-  /// that overlap so little that it does not matter. It takes half the time.
+  /// that overlap so little that it does not matter. It takes less time.
   bool first_depths = false;
 };
 

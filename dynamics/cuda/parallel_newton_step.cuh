@@ -1,6 +1,6 @@
 #pragma once
 #include "dynamics/cuda/cuda_executor.cuh"
-#include "dynamics/parallel/newton_step.h"
+#include "dynamics/parallel/parallel_newton_step.h"
 
 namespace tandem::dynamics {
 

@@ -1,6 +1,6 @@
 #pragma once
 #include "dynamics/cuda/cuda_executor.cuh"
-#include "dynamics/parallel/soft_step.h"
+#include "dynamics/parallel/parallel_soft_step.h"
 
 namespace tandem::dynamics {
 

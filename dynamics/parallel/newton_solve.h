@@ -3,7 +3,7 @@
 #include <cstdint>
 
 #include "dynamics/parallel/newton_islands.h"
-#include "dynamics/parallel/soft_step.h"
+#include "dynamics/parallel/parallel_soft_step.h"
 #include "dynamics/part_contacts.h"
 
 /// How a team solves an island of a parallel step by Newton's method.

@@ -6,13 +6,13 @@
 #include <utility>
 #include <vector>
 
-#include "dynamics/parallel/newton_step.h"
 #include "dynamics/parallel/pair_step.h"
 #include "dynamics/parallel/parallel_arrays.h"
 #include "dynamics/parallel/parallel_joints.h"
+#include "dynamics/parallel/parallel_newton_step.h"
+#include "dynamics/parallel/parallel_soft_step.h"
 #include "dynamics/parallel/simulation_rows.h"
 #include "dynamics/parallel/sleep_step.h"
-#include "dynamics/parallel/soft_step.h"
 #include "dynamics/parallel/touch_lists.h"
 #include "dynamics/parallel/wake_step.h"
 

@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "dynamics/parallel/newton_step.h"
+#include "dynamics/parallel/parallel_newton_step.h"
 #include "dynamics/same_heap_results.h"
 #include "dynamics/team_executor.h"
 

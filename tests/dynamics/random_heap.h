@@ -5,7 +5,7 @@
 #include <set>
 #include <vector>
 
-#include "dynamics/parallel/soft_step.h"
+#include "dynamics/parallel/parallel_soft_step.h"
 #include "dynamics/step_solver.h"
 
 namespace tandem::dynamics {

@@ -153,7 +153,7 @@ void ContactsAhead::find_points(const BodiesAhead& of) {
     add_moved(pose_of(of.bodies[approach.pair.a], of.states[approach.pair.a]),
               pose_of(of.bodies[approach.pair.b], moved));
   }
-  find_points_of_moved(kFirstDepthsAhead);
+  find_points_of_moved();
   std::erase_if(points_,
                 [&](ContactPoint& point) { return !take_ahead(approaches_[point.body_a / 2], point); });
 }
@@ -207,15 +207,14 @@ void ContactsAhead::add_moved(const Instance& a, const Instance& b) {
 }
 
 // Finds the contacts of moved_pairs_: points_, of which pair i has bodies 2 i and 2 i + 1.
-FinderReport ContactsAhead::find_points_of_moved(bool first_depths) {
+FinderReport ContactsAhead::find_points_of_moved() {
   FinderReport report;
   Stopwatch stopwatch;
   require(moved_.place(instances_), moved_);
   report.times.update = stopwatch.lap();
   require(contacts_.find(moved_, moved_pairs_, {}), moved_);
   report.times.traversal = stopwatch.lap();
-  require(manifolds_.find(moved_, contacts_, {.match_previous = false, .first_depths = first_depths}),
-          moved_);
+  require(manifolds_.find(moved_, contacts_, {.match_previous = false}), moved_);
   take_points(manifolds_, moved_pairs_, points_, report.contacts);
   report.times.generation = stopwatch.lap();
   report.counters = contacts_.counters();

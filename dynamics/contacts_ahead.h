@@ -90,7 +90,7 @@ class ContactsAhead {
                       std::span<const BodyState> end);
   void clear_moved();
   void add_moved(const Instance& a, const Instance& b);
-  FinderReport find_points_of_moved(bool first_depths = false);
+  FinderReport find_points_of_moved();
   static void add_points(const std::vector<ContactPoint>& points, std::vector<ContactPoint>& found);
 
   const PairFilter* filter_;

@@ -149,9 +149,6 @@ TANDEM_HD inline DistanceTolerance distance_tolerance(const BodiesAhead& of) {
   return {0.1 * of.overlap(), 0.1};
 }
 
-/// Bodies that have gone their way overlap so little that the first depths do: see ManifoldOptions.
-inline constexpr bool kFirstDepthsAhead = true;
-
 /// A way on which a pair may meet.
 struct Approach {
   ObjectPair pair;

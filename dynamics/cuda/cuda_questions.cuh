@@ -181,12 +181,11 @@ class CudaQuestions {
     return {pairs.pairs, pairs.count, pairs.capacity};
   }
 
-  FoundManifolds manifolds(const PosedList& bodies, const PairList& pairs, bool first_depths) {
+  FoundManifolds manifolds(const PosedList& bodies, const PairList& pairs) {
     const GpuInstances instances = {bodies.asset, bodies.pose, bodies.count};
     const GpuPairs on_gpu = {pairs.pairs, pairs.count, pairs.most};
     take(contacts_.enqueue(instances, on_gpu, kContactOptions, to_.stream()));
-    take(manifolds_.enqueue(instances, on_gpu, contacts_,
-                            {.match_previous = false, .first_depths = first_depths}, to_.stream()));
+    take(manifolds_.enqueue(instances, on_gpu, contacts_, {.match_previous = false}, to_.stream()));
     const GpuManifoldReport* const report = manifolds_.device_report();
     to_.once(cuda_questions_detail::TakeManifolds{contacts_.device_report(), report, needs_.data(),
                                                   found_.data()});

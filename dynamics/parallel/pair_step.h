@@ -178,7 +178,7 @@ struct PairStep {
       }
     });
     to.once([of] TANDEM_HD() { of.counts->approaches = of.sums[least_of(of.counts->apart, of.most_pairs)]; });
-    ask_about_moved(&of.counts->approaches, kFirstDepthsAhead);
+    ask_about_moved(&of.counts->approaches);
     to.for_each(&of.counts->apart, a.most_pairs, [of] TANDEM_HD(std::uint32_t r) {
       PairPlan& plan = of.plans[of.list[r]];
       const std::uint32_t ways = plan.first_found + plan.found <= of.most_moved ? plan.found : 0;
@@ -221,17 +221,16 @@ struct PairStep {
   }
 
   /// Finds the contacts of the rows: row r of two moved bodies.
-  void ask_about_moved(const std::uint32_t* rows, bool first_depths = false) {
-    take_points({a.moved_asset, a.moved_pose, 2 * a.most_moved}, {a.moved_pairs, rows, a.most_moved},
-                first_depths);
+  void ask_about_moved(const std::uint32_t* rows) {
+    take_points({a.moved_asset, a.moved_pose, 2 * a.most_moved}, {a.moved_pairs, rows, a.most_moved});
   }
 
-  void take_points(const PosedList& bodies, const PairList& pairs, bool first_depths = false) {
+  void take_points(const PosedList& bodies, const PairList& pairs) {
     using namespace pair_step_detail;
     const StepArrays of = a;
     to.for_each(pairs.count, pairs.most,
                 [of] TANDEM_HD(std::uint32_t r) { of.row_first[r] = of.row_end[r] = 0; });
-    const FoundManifolds found = ask.manifolds(bodies, pairs, first_depths);
+    const FoundManifolds found = ask.manifolds(bodies, pairs);
     to.for_each(found.count, found.most,
                 [of, found, pairs] TANDEM_HD(std::uint32_t m) { take_manifold(of, found, pairs, m); });
     to.once([of, found] TANDEM_HD() { of.counts->found += *found.point_count; });

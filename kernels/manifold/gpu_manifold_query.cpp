@@ -150,7 +150,6 @@ struct HostOf<GpuManifoldReport> : GpuHost<ManifoldState, GpuManifoldReport> {
     args.capacity = capacity();
     args.match_previous = args.matches = options.match_previous;
     args.most_points = static_cast<int>(options.most_points);
-    args.first_depths = options.first_depths;
     args.pieces = {pieces.data(), normals.data(), curve.data(), order.data(), start.data(), words.data()};
     args.table_size = static_cast<std::uint32_t>(table.room());
     return args;

@@ -356,8 +356,7 @@ __global__ void __launch_bounds__(kThreads, 4) begin_patches(const __grid_consta
   for_each_patch(args, state.next_curve_of_many, state.next_curve_of_few,
                  [&](const auto& team, std::uint32_t place, const PairCurve& curve, std::uint32_t own) {
                    with_maker(args, team, memory[own], curve, [&](auto& maker, const PatchState& made) {
-                     maker.begin(curve.curve, args.first_depths, outline[own].get(),
-                                 depth_search(args, place));
+                     maker.begin(curve.curve, outline[own].get(), depth_search(args, place));
                      const bool is_deep = made.kind == manifold::PatchKind::deep;
                      if (team.rank() == 0) {
                        args.begun[place].of = curve, args.begun[place].is_deep = is_deep;

@@ -99,7 +99,6 @@ struct ManifoldArgs {
   bool match_previous;  ///< the call before is remembered
   bool matches;         ///< points are looked for in it
   int most_points;
-  bool first_depths;
 
   ManifoldState* state;
   GpuManifoldReport* host_report;  ///< in CPU memory

@@ -35,9 +35,8 @@ class ManifoldMaker {
                           const PieceSummary& summary, PatchState& state)
       : team_(team), bodies_(bodies), memory_(memory), summary_(summary), state_(state) {}
 
-  /// Finds the normal, or the directions in which a patch of kind `deep` is to be measured. first_depths: see
-  /// ManifoldOptions.
-  TANDEM_HD void begin(std::uint32_t region, bool first_depths, OutlineMemory& shared, DepthSearch& search);
+  /// Finds the normal, or the directions in which a patch of kind `deep` is to be measured.
+  TANDEM_HD void begin(std::uint32_t region, OutlineMemory& shared, DepthSearch& search);
 
   /// Finds the rim of a patch that has a normal, and places beside which points of the overlap are looked
   /// for.
@@ -173,8 +172,7 @@ TANDEM_HD void ManifoldMaker<Team>::find_rim(std::uint32_t region, const CurveMe
 }
 
 template <typename Team>
-TANDEM_HD void ManifoldMaker<Team>::begin(std::uint32_t region, bool first_depths, OutlineMemory& shared,
-                                          DepthSearch& search) {
+TANDEM_HD void ManifoldMaker<Team>::begin(std::uint32_t region, OutlineMemory& shared, DepthSearch& search) {
   team_.sync();  // all are done with what the last region left
   NormalFinder<Team> normal_finder(team_, bodies_, memory_, summary_, region, shared.normal);
   {
@@ -189,7 +187,7 @@ TANDEM_HD void ManifoldMaker<Team>::begin(std::uint32_t region, bool first_depth
     search.middle = search.measure.middle, search.reach = reach;
     search.both_ways = is_deep && shared.normal.both_ways;
     search.directions = search.both_ways ? 2 * lines : lines;
-    search.enough = first_depths && !is_deep ? 0 : INFINITY;
+    search.enough = INFINITY;
     if (state_.kind == PatchKind::overlap) search.tried[0] = state_.frame.n;
     for (int i = 0; i < lines && is_deep; ++i) search.tried[i] = shared.normal.tried[i];
   }

@@ -27,7 +27,7 @@ struct alignas(64) PairPatches {
   /// Adds the patches of a pair. False: out of memory.
   template <typename Team>
   bool add(const Team& team, const manifold::BodyPair& bodies, const Contact* contacts, std::uint32_t count,
-           int most_points, bool first_depths) {
+           int most_points) {
     manifold::PieceMemory memory;
     if (!make_room(count, memory)) return false;
     manifold::CurveFinder<Team> finder(team, bodies, memory);
@@ -41,7 +41,7 @@ struct alignas(64) PairPatches {
       return enough_memory ? &patches[patches.size() - 1] : nullptr;
     };
     for (std::uint32_t region = 0; region < summary.curves; ++region) {
-      maker.begin(region, first_depths, outline_, search_);
+      maker.begin(region, outline_, search_);
       maker.measure(region, search_, outline_, depths_);
       ambiguous_touches += state_.kind == manifold::PatchKind::ambiguous;
       maker.finish(region, most_points, choice_, new_patch);

@@ -248,7 +248,7 @@ struct DepthSearch {
   double reach;  ///< from the middle to the rim; of a deep patch, to all pieces
   int directions, places;
   bool both_ways;  ///< along each line that is tried
-  double enough;   ///< no line needs to be deeper
+  double enough;   ///< no line along another direction needs to be deeper
   Vector3 tried[kMostTried];
   Seeds seeds;  ///< at first, places on the curve
 

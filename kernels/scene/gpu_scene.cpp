@@ -200,7 +200,7 @@ class Gpu final : public SceneDevice {
               const DeviceAnswer<Manifold, ManifoldCounters>& found) override {
     if (found.pairs.size() == 0) found.memory.reset();  // no points of before are found again
     points.clear();
-    const GpuManifoldOptions on_gpu = {options.match_previous, options.most_points, options.first_depths};
+    const GpuManifoldOptions on_gpu = {options.match_previous, options.most_points};
     return ask<GpuManifoldQuery>(scene, found, Status::kOk, [&](auto& query) {
       const auto& query_of_contacts = query_of<GpuContactQuery>(contacts);
       GpuMoved on_gpu_moved = {};

@@ -26,11 +26,10 @@ class HostQuestions {
     return {pairs_.data(), &near_count_, most_pairs_};
   }
 
-  FoundManifolds manifolds(const PosedList& bodies, const PairList& pairs, bool first_depths) {
+  FoundManifolds manifolds(const PosedList& bodies, const PairList& pairs) {
     place(bodies, nullptr);
     require(contacts_.find(scene_, {pairs.pairs, std::min(*pairs.count, pairs.most)}, {}), scene_);
-    require(manifolds_.find(scene_, contacts_, {.match_previous = false, .first_depths = first_depths}),
-            scene_);
+    require(manifolds_.find(scene_, contacts_, {.match_previous = false}), scene_);
     manifold_count_ = static_cast<std::uint32_t>(manifolds_.rows().size());
     point_count_ = static_cast<std::uint32_t>(manifolds_.points().size());
     return {manifolds_.rows().data(), manifolds_.points().data(), &manifold_count_, &point_count_,

@@ -150,26 +150,6 @@ TEST(ManifoldQuery, FewerPointsMayBeAskedFor) {
   }
 }
 
-// The same patches push the same ways, but some less deep.
-TEST(ManifoldQuery, FirstDepthsAreNoLargerThanTheDeepest) {
-  ManifoldScene scene;
-  fill(scene, 6, 40);
-  scene.find();
-  const std::vector<Manifold> deepest(scene.manifolds().begin(), scene.manifolds().end());
-  scene.find(kIdentityPose, {.match_previous = false, .first_depths = true});
-  ASSERT_EQ(scene.manifolds().size(), deepest.size());
-  std::size_t smaller = 0;
-  for (std::size_t i = 0; i < deepest.size(); ++i) {
-    const Manifold& m = scene.manifolds()[i];
-    EXPECT_TRUE(std::ranges::equal(m.normal, deepest[i].normal)) << i;
-    EXPECT_TRUE(std::ranges::equal(m.area_vector, deepest[i].area_vector)) << i;
-    EXPECT_LE(m.depth, deepest[i].depth * (1 + 1e-6)) << i;
-    smaller += m.depth < 0.99 * deepest[i].depth ? 1 : 0;
-  }
-  EXPECT_GT(smaller, deepest.size() / 20);
-  EXPECT_LT(smaller, deepest.size());
-}
-
 TEST(ManifoldQuery, AnInstanceWithItselfHasNone) {
   ManifoldScene scene;
   scene.add_shape(joined(cube(0.5f), moved(cube(0.5f), 0.25f, 0.25f, 0.75f)));

@@ -14,9 +14,6 @@ struct ManifoldOptions {
   bool match_previous = true;
   std::uint32_t most_points =
       kMostManifoldPoints;  ///< of a manifold, from 1 to kMostManifoldPoints, else kBadOption
-  /// Depths are those of lines through a few points of each overlap, so they may be too small: for bodies
-  /// that overlap so little that it does not matter. It takes less time.
-  bool first_depths = false;
 };
 
 /// Makes contact manifolds of contacts. Rows are manifolds by ascending pair and, within a pair, by their

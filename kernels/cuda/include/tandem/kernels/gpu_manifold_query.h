@@ -12,7 +12,6 @@ struct GpuManifoldOptions {
   /// See ManifoldOptions.
   bool match_previous = true;
   std::uint32_t most_points = kMostManifoldPoints;
-  bool first_depths = false;
 };
 
 /// The number of each that there is room for, or that needs room.

@@ -29,19 +29,22 @@ void ContactsAhead::find_near(const BodiesAhead& of) {
       now.distance = before->distance - between(pair) * (1 + 1e-9);
     now.distance = std::max(now.distance, least_distance(of, pair));
     const PairReach reach = reach_of(of, pair, now.distance);
-    now.reach = reach.reach, now.slow = reach.is_slow;
+    now.reach = reach.reach, now.asked = reach.asked, now.slow = reach.is_slow;
     if (reach.is_near && reach.is_slow) slow_.push_back(pair);
     if (reach.is_fast) fast_.push_back(pair);
   }
   apart_.swap(now_apart_);
 }
 
-std::span<const ObjectPair> ContactsAhead::find_in_middle(std::span<const ObjectPair> touched,
+std::span<const ObjectPair> ContactsAhead::find_in_middle(std::span<const CachedContact> remembered,
                                                           const BodiesAhead& of) {
   pairs_.clear(), of_middle_.clear(), in_middle_.clear();
   report_ = {};
-  std::ranges::set_intersection(touched, fast_, std::back_inserter(pairs_));
-  std::erase_if(pairs_, [&](const ObjectPair& pair) { return !has_middle(of, pair); });
+  for (const ObjectPair& pair : fast_) {
+    const auto of_pair =
+        std::ranges::equal_range(remembered, pair, {}, [](const CachedContact& c) { return c.pair; });
+    if (has_middle(of, {of_pair.begin(), of_pair.end()})) pairs_.push_back(pair);
+  }
   if (pairs_.empty()) return of_middle_;
   clear_moved();
   for (const ObjectPair& pair : pairs_) add_moved(pose_in_middle(of, pair.a), pose_in_middle(of, pair.b));
@@ -115,8 +118,7 @@ double ContactsAhead::farthest(const BodiesAhead& of) {
   return largest.farthest(of.overlap());
 }
 
-// Finds on which ways pairs may meet within the step, from their distances. These are asked for farther than
-// is needed now, so that most need not be asked for in the next steps.
+// Finds on which ways pairs may meet within the step, from their distances.
 void ContactsAhead::find_approaches(std::span<const ContactPoint> found, std::span<const ObjectPair> kept,
                                     const BodiesAhead& of) {
   pairs_.clear(), places_.clear(), reaches_.clear(), approaches_.clear();
@@ -129,7 +131,7 @@ void ContactsAhead::find_approaches(std::span<const ContactPoint> found, std::sp
     while (known != kept.end() && *known < apart.pair) ++known;
     if (known != kept.end() && *known == apart.pair) continue;
     if (apart.distance > apart.reach) continue;
-    pairs_.push_back(apart.pair), places_.push_back(i), reaches_.push_back(asked_reach(apart.reach));
+    pairs_.push_back(apart.pair), places_.push_back(i), reaches_.push_back(apart.asked);
   }
   if (pairs_.empty()) return;
   require(distances_.find(scene_, pairs_, {.tolerance = distance_tolerance(of), .reach_of_pair = reaches_}),

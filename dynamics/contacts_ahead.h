@@ -45,9 +45,10 @@ class ContactsAhead {
   /// on as they do. A body that rolls, swings or slides takes its contacts along: those of the middle act for
   /// the whole step with an error of second order in it, those of the start with one of first order. Result:
   /// the pairs that have such contacts, ascending, valid until the next call of a function that finds any;
-  /// add_to() adds them. touched: ascending. Condition: find_near() was called for the same bodies. Throws
-  /// QueryFailed.
-  std::span<const ObjectPair> find_in_middle(std::span<const ObjectPair> touched, const BodiesAhead& of);
+  /// add_to() adds them. remembered: of the step before, by ascending pair. Condition: find_near() was called
+  /// for the same bodies. Throws QueryFailed.
+  std::span<const ObjectPair> find_in_middle(std::span<const CachedContact> remembered,
+                                             const BodiesAhead& of);
 
   /// Returns the report of the last find_in_middle().
   const FinderReport& report() const { return report_; }
@@ -73,7 +74,7 @@ class ContactsAhead {
 
  private:
   struct Apart : PairApart {
-    double reach = 0;  ///< how far apart they may be and meet within the step
+    double reach = 0, asked = 0;  ///< see PairReach
     bool slow = false;
   };
   void place(const BodiesAhead& of);

@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "dynamics/bodies_ahead.h"
+#include "dynamics/remembered_contacts.h"
 #include "tandem/kernels/distance_query.h"
 
 /// What is asked about a pair of bodies before a step, and what is made of the answers: rules for host and
@@ -59,6 +60,7 @@ TANDEM_HD inline double way_between(const BodyWay& a, const BodyWay& b) {
 /// Says how a pair may come together within a step.
 struct PairReach {
   double reach;  ///< how far apart they may be and meet
+  double asked;  ///< how far apart they are asked for their distance
   bool is_slow;  ///< points move against each other by no more than the slop
   bool is_near;  ///< it may meet, for all that is known
   bool is_fast;  ///< it may meet, is not slow, and is not surely apart now
@@ -71,7 +73,8 @@ TANDEM_HD inline double least_distance(const BodiesAhead& of, const ObjectPair& 
          pair_ahead_detail::rounding_of(of, pair);
 }
 
-/// distance: by which the bodies are apart at least.
+/// distance: by which the bodies are apart at least. A pair is asked for its distance farther than it needs
+/// now if that spares it the question in the next step, as far as its bodies go on as they do.
 TANDEM_HD inline PairReach reach_of(const BodiesAhead& of, const ObjectPair& pair, double distance) {
   using namespace pair_ahead_detail;
   const double way = of.dt * (norm(of.approach(pair)) + of.turning(pair));
@@ -79,7 +82,9 @@ TANDEM_HD inline PairReach reach_of(const BodiesAhead& of, const ObjectPair& pai
   const double rounding = rounding_of(of, pair);
   const double reach = std::max(std::min(way + margin, kFarthest * smaller_radius(of, pair)), rounding);
   const bool is_slow = way <= of.slop, is_near = !(distance > reach);
-  return {reach, is_slow, is_near, is_near && !is_slow && !(distance > rounding)};
+  const double farther = 1.5 * reach;
+  return {reach, farther - way > reach ? farther : reach, is_slow, is_near,
+          is_near && !is_slow && !(distance > rounding)};
 }
 
 /// The largest of what bounds the reach of a pair, over all bodies that are not idle.
@@ -96,13 +101,24 @@ TANDEM_HD inline double way_ahead(const BodiesAhead& of, std::uint32_t body) {
   return of.dt * (norm(of.states[body].velocity) + of.turning(body));
 }
 
-/// Returns whether a fast pair that touched is asked about the middle of the step. What goes far might be
-/// beyond the other body by then; what is slow comes to rest.
-TANDEM_HD inline bool has_middle(const BodiesAhead& of, const ObjectPair& pair) {
+/// Returns whether a fast pair that has such contacts of the step before is asked about the middle of the
+/// step. What goes far might be beyond the other body by then; what is slow comes to rest. What touched from
+/// several sides mostly still does, and then take_middle() would not count.
+TANDEM_HD inline bool has_middle(const BodiesAhead& of, std::span<const CachedContact> remembered) {
   using namespace pair_ahead_detail;
+  if (remembered.empty()) return false;
+  const ObjectPair& pair = remembered[0].pair;
   const double way = norm(of.approach(pair));
-  return !(0.5 * of.dt * way > kFarthest * smaller_radius(of, pair) ||
-           of.dt * (way + of.turning(pair)) <= kFastFrom * of.slop);
+  if (0.5 * of.dt * way > kFarthest * smaller_radius(of, pair) ||
+      of.dt * (way + of.turning(pair)) <= kFastFrom * of.slop)
+    return false;
+  const CachedContact* first = nullptr;
+  for (const CachedContact& contact : remembered) {
+    if (!was_found(contact)) continue;
+    if (first == nullptr) first = &contact;
+    if (!(dot(contact.normal_in_a, first->normal_in_a) > kOneSide)) return false;
+  }
+  return true;
 }
 
 /// Returns where a body is in the middle of the step.
@@ -129,11 +145,6 @@ TANDEM_HD inline bool take_middle(const BodiesAhead& of, const ObjectPair& pair,
   return lasts;
 }
 
-/// Returns how far apart a pair is asked for its distance: farther than it needs now, so that most pairs need
-/// not be asked again in the next steps.
-TANDEM_HD inline double asked_reach(double reach) {
-  return 1.5 * reach;
-}
 TANDEM_HD inline DistanceTolerance distance_tolerance(const BodiesAhead& of) {
   return {0.1 * of.overlap(), 0.1};
 }

@@ -35,6 +35,11 @@ struct PairContactCounts {
   std::uint32_t remembered = 0, contacts = 0;
 };
 
+/// Returns whether the step before found the contact, or it pushed then.
+TANDEM_HD inline bool was_found(const CachedContact& contact) {
+  return contact.quiet_steps <= 1;
+}
+
 namespace remembered_contacts_detail {
 
 inline constexpr double kNear = 0.02, kMatches = 0.1;  // of the smaller body's radius

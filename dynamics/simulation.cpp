@@ -98,7 +98,7 @@ void Simulation::find_contacts(StepRecord& record) {
   if (parts_.ahead) {
     parts_.ahead->find_near(ahead);
     record.broad_phase += stopwatch.lap();
-    known = parts_.ahead->find_in_middle(touching, ahead);
+    known = parts_.ahead->find_in_middle(cache_.entries(), ahead);
     add(record, parts_.ahead->report());
     std::vector<ObjectPair> all;
     std::ranges::set_union(touching, parts_.ahead->slow(), std::back_inserter(all));
@@ -115,7 +115,8 @@ void Simulation::find_contacts(StepRecord& record) {
   });
   if (parts_.ahead) parts_.ahead->add_to(found_, parts_.contacts->kept(), ahead);
   drop_contacts_of_fixed();
-  cache_.update(found_, parts_.contacts->kept(), ahead);
+  kept_.assign(parts_.contacts->kept().begin(), parts_.contacts->kept().end());
+  cache_.update(found_, kept_, ahead);
   record.generation += stopwatch.lap();
   record.contacts = cache_.contacts().size();
   for (const ContactPoint& contact : cache_.contacts()) {
@@ -185,9 +186,8 @@ bool Simulation::find_missed(std::span<const BodyState> before) {
   const std::span<const ObjectPair> missed =
       parts_.ahead->add_missed(found_, cache_.contacts(), start, states_);
   if (missed.empty()) return false;
-  std::vector<ObjectPair> kept;
-  std::ranges::set_difference(parts_.contacts->kept(), missed, std::back_inserter(kept));
-  cache_.update_again(found_, kept, start);
+  std::erase_if(kept_, [&](const ObjectPair& pair) { return std::ranges::binary_search(missed, pair); });
+  cache_.update_again(found_, kept_, start);
   return true;
 }
 

@@ -169,6 +169,7 @@ class Simulation {
   std::vector<std::uint32_t> broken_;  // in the last step
   Islands islands_;
   std::vector<ContactPoint> found_;
+  std::vector<ObjectPair> kept_;  // pairs whose contacts are those remembered, in this step
   ContactCache cache_;
   std::vector<ContactImpulse> done_;  // of its contacts, in the last step
   Touches touches_;

@@ -90,12 +90,14 @@ TANDEM_HD inline void plan_pair(const StepArrays& a, std::uint32_t at, const Obj
   if (!is_near) return;
   record.apart = std::max(record.apart, least_distance(of, pair));
   const PairReach reach = reach_of(of, pair, record.apart);
-  plan.reach = reach.reach, plan.is_slow = reach.is_slow;
+  plan.reach = reach.reach, plan.asked = reach.asked, plan.is_slow = reach.is_slow;
   plan.is_in_reach = reach.is_near, plan.is_fast = reach.is_fast;
 }
 
-TANDEM_HD inline bool touched(const StepArrays& a, const PairPlan& plan) {
-  return plan.before != kNoIndex && a.records_before[plan.before].count > 0;
+// Returns the contacts that a pair had in the step before.
+TANDEM_HD inline std::span<const CachedContact> remembered_before(const StepArrays& a, const PairPlan& plan) {
+  if (plan.before == kNoIndex) return {};
+  return a.remembered_of(a.records_before[plan.before]);
 }
 
 // Decides whether a pair keeps what is remembered of it, as MovedQuery does, and whether it is asked for
@@ -104,7 +106,8 @@ TANDEM_HD inline void decide_pair(const StepArrays& a, std::uint32_t at) {
   PairRecord& record = a.records[at];
   PairPlan& plan = a.plans[at];
   const ObjectPair& pair = record.pair;
-  const bool is_remembered = (touched(a, plan) || (plan.is_in_reach && plan.is_slow)) && !plan.is_of_middle;
+  const bool is_remembered =
+      (!remembered_before(a, plan).empty() || (plan.is_in_reach && plan.is_slow)) && !plan.is_of_middle;
   record.is_posed = is_remembered;
   if (is_remembered) {
     const PairRecord* const old = plan.before != kNoIndex ? &a.records_before[plan.before] : nullptr;
@@ -136,8 +139,7 @@ TANDEM_HD inline void remember_pair(const StepArrays& a, std::uint32_t at) {
   const PairPlan& plan = a.plans[at];
   record.first = record.first_contact = a.sums[at];
   record.count = record.contacts = 0;
-  std::span<const CachedContact> old;
-  if (plan.before != kNoIndex) old = a.remembered_of(a.records_before[plan.before]);
+  const std::span<const CachedContact> old = remembered_before(a, plan);
   const PairContacts to = {a.remembered + record.first, a.contacts + record.first, a.place + record.first};
   if (plan.is_idle) {
     for (std::size_t i = 0; i < old.size(); ++i) to.remembered[i] = old[i];

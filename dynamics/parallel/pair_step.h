@@ -117,7 +117,7 @@ struct PairStep {
     select(
         [of] TANDEM_HD(std::uint32_t i) {
           const PairPlan& plan = of.plans[i];
-          return plan.is_fast && touched(of, plan) && has_middle(of.ahead(), of.records[i].pair);
+          return plan.is_fast && has_middle(of.ahead(), remembered_before(of, plan));
         },
         &of.counts->middle);
     to.for_each(&of.counts->middle, a.most_moved, [of] TANDEM_HD(std::uint32_t r) {
@@ -151,7 +151,7 @@ struct PairStep {
     select([of] TANDEM_HD(std::uint32_t i) { return is_asked_how_far(of, i); }, &of.counts->apart);
     list_asked(&of.counts->apart);
     to.for_each(&of.counts->apart, a.most_pairs,
-                [of] TANDEM_HD(std::uint32_t r) { of.reach[r] = asked_reach(of.plans[of.list[r]].reach); });
+                [of] TANDEM_HD(std::uint32_t r) { of.reach[r] = of.plans[of.list[r]].asked; });
     const ObjectDistance* const distances =
         ask.distances({a.asset, a.pose, a.bodies}, {a.asked, &of.counts->apart, a.most_pairs}, a.reach,
                       distance_tolerance(a.ahead()));

@@ -38,7 +38,7 @@ struct PairPlan {
   bool is_of_middle;                   ///< its contacts are those of the middle of the step
   bool keeps;                          ///< its contacts are those remembered
   bool is_asked;                       ///< for contacts where the bodies stand
-  double reach;                        ///< see PairReach
+  double reach, asked;                 ///< see PairReach
   std::uint32_t first_found, found;    ///< contacts
 };
 

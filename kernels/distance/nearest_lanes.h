@@ -22,19 +22,18 @@ class BlockPairBounds : PosedBlockPair {
     }
   }
 
-  /// Writes 16 bounds. Result: the mask of those below the limit.
-  TANDEM_INLINE unsigned write(float limit, float* out) const {
-    if constexpr (kCount == 16)
-      return part<0>(limit, out);
-    else if constexpr (kCount == 8)
-      return part<0>(limit, out) | part<1>(limit, out);
-    else
-      return part<0>(limit, out) | part<1>(limit, out) | part<2>(limit, out) | part<3>(limit, out);
+  /// Writes 16 bounds. Result: which of them are below the limits.
+  TANDEM_INLINE PairsBelow write(float limit, float other, float* out) const {
+    PairsBelow below = {0, 0};
+    part<0>(limit, other, out, below);
+    if constexpr (kCount <= 8) part<1>(limit, other, out, below);
+    if constexpr (kCount <= 4) part<2>(limit, other, out, below), part<3>(limit, other, out, below);
+    return below;
   }
 
  private:
   template <int kPart>
-  TANDEM_INLINE unsigned part(float limit, float* out) const {
+  TANDEM_INLINE void part(float limit, float other, float* out, PairsBelow& below) const {
     Lanes<kCount> d[3], radius_on_a[3], radius_on_b[3];
 #pragma GCC unroll 3
     for (int i = 0; i < 3; ++i) {
@@ -44,7 +43,8 @@ class BlockPairBounds : PosedBlockPair {
     }
     const Lanes<kCount> bound = distance::box_bound(pose_, d, radius_on_a, radius_on_b);
     __builtin_memcpy(out + kCount * kPart, &bound, sizeof bound);
-    return less(bound, Lanes<kCount>{} + limit).mask() << (kCount * kPart);
+    below.limit |= less(bound, Lanes<kCount>{} + limit).mask() << (kCount * kPart);
+    below.other |= less(bound, Lanes<kCount>{} + other).mask() << (kCount * kPart);
   }
 
   Lanes4 b_on_a_[3], a_on_b_[3];
@@ -60,8 +60,9 @@ class NearestLaneMeans {
   float limit(double distance) const { return bound_limit(task_, distance); }
   double distance(float bound) const { return bound_distance(task_, bound); }
 
-  TANDEM_INLINE std::uint32_t bounds(const Block& a, const Block& b, float limit, float* out) const {
-    return BlockPairBounds<kCount>(a, b, task_.frame.b_in_a).write(limit, out);
+  TANDEM_INLINE PairsBelow bounds(const Block& a, const Block& b, float limit, float other,
+                                  float* out) const {
+    return BlockPairBounds<kCount>(a, b, task_.frame.b_in_a).write(limit, other, out);
   }
 
   // This is not inlined, so as not to crowd the bounds of boxes out of registers.

@@ -9,6 +9,12 @@
 namespace tandem {
 namespace {
 
+template <typename Bound>
+void add_if_below(int bit, Bound bound, Bound limit, Bound other, PairsBelow& below) {
+  if (bound < limit) below.limit |= 1u << bit;
+  if (bound < other) below.other |= 1u << bit;
+}
+
 class NearestScalarMeans {
  public:
   using Bound = float;
@@ -18,16 +24,16 @@ class NearestScalarMeans {
   float limit(double distance) const { return bound_limit(task_, distance); }
   double distance(float bound) const { return bound_distance(task_, bound); }
 
-  std::uint32_t bounds(const Block& a, const Block& b, float limit, float* out) const {
-    std::uint32_t mask = 0;
+  PairsBelow bounds(const Block& a, const Block& b, float limit, float other, float* out) const {
+    PairsBelow below = {0, 0};
     for (int i = 0; i < kNodesPerBlock; ++i) {
       for (int j = 0; j < kNodesPerBlock; ++j) {
         const int bit = 4 * i + j;
         out[bit] = box_distance_bound(box_of(a, i), box_of(b, j), task_.frame.b_in_a);
-        if (out[bit] < limit) mask |= 1u << bit;
+        add_if_below(bit, out[bit], limit, other, below);
       }
     }
-    return mask;
+    return below;
   }
 
   std::uint32_t far_along(const NearBatch& batch, const float (&direction)[3], double at_least) const {
@@ -72,8 +78,8 @@ class NearestWorldBoxMeans {
   double limit(double distance) const { return distance; }
   double distance(double bound) const { return bound; }
 
-  std::uint32_t bounds(const Block& a, const Block& b, double limit, double* out) const {
-    std::uint32_t mask = 0;
+  PairsBelow bounds(const Block& a, const Block& b, double limit, double other, double* out) const {
+    PairsBelow below = {0, 0};
     for (int i = 0; i < kNodesPerBlock; ++i) {
       if (a.kind[i] == NodeKind::imaginary) continue;
       const WorldBox box_a = node_world_box(task_.a->pose, a, i);
@@ -82,10 +88,10 @@ class NearestWorldBoxMeans {
         const WorldBox box_b = node_world_box(task_.b->pose, b, j);
         const int bit = 4 * i + j;
         out[bit] = distance_between(box_a, box_b);
-        if (out[bit] < limit) mask |= 1u << bit;
+        add_if_below(bit, out[bit], limit, other, below);
       }
     }
-    return mask;
+    return below;
   }
 
   std::uint32_t far_along(const NearBatch&, const float (&)[3], double) const { return 0; }

@@ -1,5 +1,6 @@
 #pragma once
 #include <algorithm>
+#include <limits>
 
 #include "kernels/common/traversal.h"
 #include "kernels/contact/pairs_below.h"
@@ -88,18 +89,23 @@ class WaitingPairs {
   BoundedBlockPair pairs_[kMost];
 };
 
-/// The means of a variant are made of a task and bring: Bound, a number type; bounds(a, b, limit, out): the
-/// bounds of all node pairs, and the mask of those below the limit, imaginary nodes never; limit(distance),
-/// distance(bound), see box_distance.h; far_along(batch, direction, distance): which of the first kNearBatch
-/// pairs of triangles, any where there are fewer, are surely at least so far apart along the direction; and
-/// bound(batch, out) of them.
+/// Node pairs of two blocks, a bit each: those whose bounds are below one limit, and below another.
+struct PairsBelow {
+  std::uint32_t limit, other;
+};
+
+/// The means of a variant are made of a task and bring: Bound, a number type; bounds(a, b, limit, other,
+/// out): the bounds of all node pairs, and the masks of those below both limits, imaginary nodes never;
+/// limit(distance), distance(bound), see box_distance.h; far_along(batch, direction, distance): which of the
+/// first kNearBatch pairs of triangles, any where there are fewer, are surely at least so far apart along the
+/// direction; and bound(batch, out) of them.
 template <typename Means>
 class NearestWalk {
  public:
   NearestWalk(const NearestTask& task, NearestSoFar& state) : task_(task), state_(state), means_(task) {}
 
   void run(const BoundedBlockPair* from, std::uint32_t count) {
-    take_limits();
+    take_limit();
     if (state_.found) wait_in_order();
     std::uint32_t next = 0;
     while (next < count && goes_on() && is_within_limits()) {
@@ -109,6 +115,8 @@ class NearestWalk {
     if (goes_on()) bound_triangles(true);
     while (goes_on() && (height_ > 0 || take_nearest())) leave(stack_[--height_], state_);
     for (; next < count && goes_on(); ++next) leave(from[next], state_);
+    if (passed_over_ < std::numeric_limits<Bound>::infinity())
+      state_.floor = std::min(state_.floor, means_.distance(passed_over_));
   }
 
  private:
@@ -119,32 +127,22 @@ class NearestWalk {
     return visits_ < state_.most_visits && state_.bounded < state_.most_bounded;
   }
 
-  void take_limits() {
-    limit_ = means_.limit(nearness(task_, state_));
-    limit_without_tolerance_ = means_.limit(state_.upper);
-  }
-
-  /// Entries with this bound count no longer.
-  void pass_over(Bound bound) {
-    if (bound < limit_without_tolerance_) state_.floor = std::min(state_.floor, means_.distance(bound));
-  }
+  void take_limit() { limit_ = means_.limit(nearness(task_, state_)); }
 
   void visit(const BoundedBlockPair& taken) {
-    const BoundedBlockPair pair = taken;  // the stack changes below
-    if (!(static_cast<Bound>(pair.bound) < limit_)) return pass_over(static_cast<Bound>(pair.bound));
+    const BoundedBlockPair pair = taken;               // the stack changes below
+    if (!(static_cast<Bound>(pair.bound) < limit_)) {  // it counts no longer
+      passed_over_ = std::min(passed_over_, static_cast<Bound>(pair.bound));
+      return;
+    }
     const Block &a = task_.a->tree.blocks[pair.a], &b = task_.b->tree.blocks[pair.b];
     alignas(64) Bound bound[16];
-    const std::uint32_t open = means_.bounds(a, b, limit_without_tolerance_, bound) & pair.mask;
+    const PairsBelow below = means_.bounds(a, b, limit_, passed_over_, bound);
     ++state_.counters.block_pairs;
     ++visits_;
-    std::uint32_t hits = 0;
-    for (std::uint32_t bits = open; bits != 0; bits &= bits - 1) {
-      const int bit = lowest_bit(bits);
-      if (bound[bit] < limit_)
-        hits |= 1u << bit;
-      else
-        pass_over(bound[bit]);
-    }
+    std::uint32_t hits = below.limit & pair.mask;
+    for (std::uint32_t bits = below.other & ~below.limit & pair.mask; bits != 0; bits &= bits - 1)
+      passed_over_ = std::min(passed_over_, bound[lowest_bit(bits)]);
     if (hits != 0 && state_.heights != nullptr) [[unlikely]]
       hits = drop_by_heights(task_, pair.a, pair.b, hits, state_);
     if (hits == 0) return;
@@ -248,13 +246,14 @@ class NearestWalk {
         add_candidate({found.lower[i], found.upper[i], near_.a[i], near_.b[i]}, state_);
     }
     near_.drop(count);
-    take_limits();
+    take_limit();
   }
 
   const NearestTask& task_;
   NearestSoFar& state_;
   const Means means_;
-  Bound limit_, limit_without_tolerance_;
+  Bound limit_;  ///< pairs of blocks with this bound count no longer
+  Bound passed_over_ = std::numeric_limits<Bound>::infinity();  ///< the least bound of what is passed over
   NearBatch leaves_, near_;
   WaitingPairs waiting_;
   /// Depth first, one pair at a time, each leaving 15 beside the one that is taken next, on at most as many

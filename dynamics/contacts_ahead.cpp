@@ -41,9 +41,9 @@ std::span<const ObjectPair> ContactsAhead::find_in_middle(std::span<const Cached
   pairs_.clear(), of_middle_.clear(), in_middle_.clear();
   report_ = {};
   for (const ObjectPair& pair : fast_) {
-    const auto of_pair =
-        std::ranges::equal_range(remembered, pair, {}, [](const CachedContact& c) { return c.pair; });
-    if (has_middle(of, {of_pair.begin(), of_pair.end()})) pairs_.push_back(pair);
+    const auto first = std::ranges::lower_bound(remembered, pair, {}, &CachedContact::pair);
+    const auto last = std::ranges::upper_bound(first, remembered.end(), pair, {}, &CachedContact::pair);
+    if (has_middle(of, {first, last})) pairs_.push_back(pair);
   }
   if (pairs_.empty()) return of_middle_;
   clear_moved();

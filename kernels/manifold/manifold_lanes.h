@@ -45,7 +45,7 @@ struct ManifoldLanes {
                               const manifold::PatchFrame& frame, double one_by_unit, int ends,
                               manifold::Candidate* candidates, manifold::RimMoments& moments);
   void (*furthest)(const manifold::PieceMemory& memory, const manifold::Candidate* candidates,
-                   std::uint32_t count, const manifold::RimValue* values, int wanted,
+                   std::uint32_t count, const manifold::RimValue* values, float unit, int wanted,
                    manifold::Furthest* best);
   /// The next candidate from `i` on whose distance's square from a point is less, or `count`.
   std::uint32_t (*next_near)(const manifold::Candidate* candidates, std::uint32_t i, std::uint32_t count,

@@ -548,8 +548,11 @@ TANDEM_HD void ManifoldMaker<Team>::write_manifold(const ChoiceMemory& shared, P
     return write(state_.centre, manifold.centre);
   }
   const PatchFrame& frame = state_.frame;
-  double height = 0;
-  for (int i = 0; i < count; ++i) height += shared.chosen[i].height / count;
+  double height = 0, depth = 0;
+  for (int i = 0; i < count; ++i) {
+    height += shared.chosen[i].height / count;
+    depth = greater(shared.chosen[i].depth, depth);
+  }
   Vector3 area = state_.area;
   if (!state_.closed) {
     // The curve bounds no area: that of the rim stands in.
@@ -565,7 +568,7 @@ TANDEM_HD void ManifoldMaker<Team>::write_manifold(const ChoiceMemory& shared, P
   write(area, manifold.area_vector);
   write(frame.at(state_.closed && state_.has_area ? state_.middle_of_area : state_.middle, height),
         manifold.centre);
-  manifold.depth = touch ? 0 : shared.chosen[0].depth;
+  manifold.depth = touch ? 0 : depth;
 }
 
 template <typename Team>

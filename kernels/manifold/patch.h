@@ -125,20 +125,28 @@ struct FloatPoint {
   float x, y;
 };
 
+/// Candidates are rounded to float32. Ways between them that differ by less than this part of their largest
+/// coordinate are equal but for that.
+inline constexpr float kTiedOnRim = 0x1p-21f;
+
 /// The value that a candidate is to have most of: distance from p, or distance beyond the line from p to q,
 /// times its length.
 struct RimValue {
   FloatPoint p, q;
   bool distance;
 
+  /// Returns how much less than the greatest value, which is positive, one may be and equal to it but for
+  /// rounding. unit: no coordinate is larger.
+  TANDEM_HD float tied(float greatest, float unit) const {
+    const float x = q.x - p.x, y = q.y - p.y;
+    return lesser(kTiedOnRim * unit * std::sqrt(distance ? greatest : x * x + y * y), greatest / 2);
+  }
+
   TANDEM_HD float operator()(const Candidate& c) const {
     const float x = c.x - p.x, y = c.y - p.y;
     return distance ? x * x + y * y : (q.y - p.y) * x - (q.x - p.x) * y;
   }
 };
-
-/// Candidates whose values differ by less than this part have equal ones, but for float32 rounding.
-inline constexpr float kTiedOnRim = 0x1p-12f;
 
 /// The candidate that has most of something: of those whose values are equal but for rounding, the one whose
 /// triangles come first.
@@ -150,8 +158,6 @@ struct Furthest {
     const Piece& p = memory.pieces[reference / 8];
     return std::uint64_t{p.triangle[0]} << 33 | std::uint64_t{p.triangle[1]} << 3 | (reference & 7u);
   }
-  /// Values of this or more come into question, if the greatest is known and more than what was given.
-  TANDEM_HD float limit() const { return value - kTiedOnRim * std::fabs(value); }
   TANDEM_HD void take(const PieceMemory& memory, std::uint32_t of) {
     if (reference == kNoIndex || key(memory, of) < key(memory, reference)) reference = of;
   }

@@ -357,7 +357,7 @@ TANDEM_INLINE Lanes4 value_of(const manifold::RimValue& value, const FourCandida
 
 /// RimFinder::furthest(). First the greatest values, then who has them.
 void furthest(const manifold::PieceMemory& memory, const manifold::Candidate* candidates, std::uint32_t count,
-              const manifold::RimValue* values, int wanted, manifold::Furthest* best) {
+              const manifold::RimValue* values, float unit, int wanted, manifold::Furthest* best) {
   constexpr std::uint32_t kKept = 64;  // values of so many groups need not be computed again
   Lanes4 most[2], kept[2][kKept];
   for (int w = 0; w < wanted; ++w) most[w].v = Lanes4::Floats{} + best[w].value;
@@ -375,10 +375,11 @@ void furthest(const manifold::PieceMemory& memory, const manifold::Candidate* ca
     for (int k = 1; k < 4; ++k) greatest = manifold::greater(greatest, most[w].v[k]);
     if (!(greatest > best[w].value)) continue;
     best[w].value = greatest;
+    const float limit = greatest - values[w].tied(greatest, unit);
     for (std::uint32_t group = 0; group < groups; ++group) {
       const Lanes4 value =
           group < kKept ? kept[w][group] : value_of(values[w], FourCandidates(candidates, 4 * group, count));
-      unsigned found = LaneMask<4>{value.v >= best[w].limit()}.mask();
+      unsigned found = LaneMask<4>{value.v >= limit}.mask();
       for (; found != 0; found &= found - 1) {
         const std::uint32_t i = 4 * group + static_cast<std::uint32_t>(std::countr_zero(found));
         if (i < count) best[w].take(memory, candidates[i].reference);

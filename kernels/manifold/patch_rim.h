@@ -51,6 +51,8 @@ class RimFinder {
     const Vector2 at = frame_.flat(x);
     candidates()[team_.add(next, 1)] = {static_cast<float>(at.x), static_cast<float>(at.y), reference};
   }
+  /// No coordinate of a candidate is larger.
+  TANDEM_HD float unit() const { return 2 * static_cast<float>(summary_.unit); }
   template <int kWanted>
   TANDEM_HD void furthest(const RimValue (&values)[kWanted], Furthest (&best)[kWanted]) const;
 
@@ -128,19 +130,22 @@ template <typename Team>
 template <int kWanted>
 TANDEM_HD void RimFinder<Team>::furthest(const RimValue (&values)[kWanted], Furthest (&best)[kWanted]) const {
   if constexpr (HasLanes<Team>)
-    return team_.lanes().furthest(memory_, candidates(), count_, values, kWanted, best);
+    return team_.lanes().furthest(memory_, candidates(), count_, values, unit(), kWanted, best);
   float greatest[kWanted];
   for (int k = 0; k < kWanted; ++k) greatest[k] = best[k].value;
   for (std::uint32_t i = team_.rank(); i < count_; i += team_.size()) {
     for (int k = 0; k < kWanted; ++k) greatest[k] = greater(values[k](candidates()[i]), greatest[k]);
   }
   team_.greatest_ones(greatest);
-  bool any[kWanted];
-  for (int k = 0; k < kWanted; ++k) any[k] = greatest[k] > best[k].value, best[k].value = greatest[k];
+  float limit[kWanted];
+  for (int k = 0; k < kWanted; ++k) {
+    limit[k] = greatest[k] > best[k].value ? greatest[k] - values[k].tied(greatest[k], unit()) : INFINITY;
+    best[k].value = greatest[k];
+  }
   for (std::uint32_t i = team_.rank(); i < count_; i += team_.size()) {
     const Candidate& c = candidates()[i];
     for (int k = 0; k < kWanted; ++k) {
-      if (any[k] && values[k](c) >= best[k].limit()) best[k].take(memory_, c.reference);
+      if (values[k](c) >= limit[k]) best[k].take(memory_, c.reference);
     }
   }
   if (Team::size() == 1) return;
@@ -160,7 +165,7 @@ TANDEM_HD void RimFinder<Team>::furthest(const RimValue (&values)[kWanted], Furt
 template <typename Team>
 TANDEM_HD void RimFinder<Team>::find(int most, const Vector2& middle, RimMemory& shared) const {
   Rim& rim = shared.rim;
-  float limit = 0, area = 0;
+  float limit = 0, area = 0, reach = 0;
   // The first of the team writes what is shared, after all have found the furthest together.
   const bool is_first = team_.rank() == 0;
   if (is_first) rim.points = 0, shared.first = 0, shared.second = 1, shared.complete = false;
@@ -190,6 +195,7 @@ TANDEM_HD void RimFinder<Team>::find(int most, const Vector2& middle, RimMemory&
     const float than = rim.points == 0 ? -1.0f : 0.0f;
     Furthest found[2] = {{than, kNoIndex}, {than, kNoIndex}};
     furthest(values, found);
+    if (begins) reach = std::sqrt(greater(found[0].value, 0.0f));
     team_.sync();  // all have read what is shared
     if (is_first && begins) {
       shared.complete = found[0].reference == kNoIndex;
@@ -198,7 +204,7 @@ TANDEM_HD void RimFinder<Team>::find(int most, const Vector2& middle, RimMemory&
       shared.of_side[first] = found[0], shared.of_side[second] = found[1];
       int side = 0;
       for (int i = 1; i < rim.points; ++i)
-        side = shared.of_side[i].limit() > shared.of_side[side].value ? i : side;
+        side = shared.of_side[i].value - kTiedOnRim * unit() * reach > shared.of_side[side].value ? i : side;
       const Furthest best = shared.of_side[side];
       shared.complete = !(best.value > limit);
       if (!shared.complete) {

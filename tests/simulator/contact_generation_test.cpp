@@ -97,7 +97,7 @@ TEST_P(BoxOnBox, HasTheOverlapsCornersItsNormalAndItsDepth) {
       for (const double y : {-0.5, 0.5}) {
         const Vector3 corner = {x + (x * pair.shift_x < 0 ? pair.shift_x : 0),
                                 y + (y * pair.shift_y < 0 ? pair.shift_y : 0), 0.5 - pair.depth / 2};
-        EXPECT_TRUE(any_at(points, apply(motion, corner), 1e-6)) << x << " " << y;
+        EXPECT_TRUE(any_at(points, apply(motion, corner), 2e-6)) << x << " " << y;
       }
     }
     const double area = (1 - std::fabs(pair.shift_x)) * (1 - std::fabs(pair.shift_y));

@@ -541,7 +541,7 @@ TEST(SpringOnSpring, IsFreeSoonAfterItWasPushedOutByTheDepth) {
     ++patches, steps += step;
   }
   EXPECT_GT(patches, 10);
-  EXPECT_LT(steps / patches, 5.5);
+  EXPECT_LT(steps / patches, 6);
 }
 
 // A line from beside a piece of a nanometre began outside of the open surface, and went into it.

@@ -38,9 +38,10 @@ struct Manifold {
   double normal[3];  ///< unit, from a towards b: moving b along it separates the bodies; or 0 (kAmbiguous)
   double area_vector[3];  ///< of a's surface inside b, bounded by the curve in which the surfaces cross
   double centre[3];       ///< of that area, in the world
-  double depth;           ///< how far b is to be moved along the normal to end the overlap; that of the first
-                          ///< point, so along its normal where the patch is bent
-  std::uint32_t pair;     ///< row of the list of object pairs
+  double depth;        ///< how far b is to be moved along the normal to end the overlap; that of the deepest
+                       ///< point, so along its normal where the patch is bent. The first point is as deep,
+                       ///< but for rounding
+  std::uint32_t pair;  ///< row of the list of object pairs
   std::uint32_t first_point, point_count;
   std::uint32_t flags;  ///< ManifoldFlags
 };

@@ -226,7 +226,7 @@ TEST(ParallelStep, FindsWhatAStepMissed) {
   EXPECT_GT(both.missed, 0u);
 }
 
-// The state lacks what a run file lacks: distances, and where bodies were a step before.
+// The state lacks distances and where bodies were a step before, which are found anew.
 TEST(ParallelStep, GoesOnFromWhatASimulationKept) {
   const FallingBodies bodies(24);
   BothWays one(bodies);

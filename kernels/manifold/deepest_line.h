@@ -58,16 +58,16 @@ class DeepestLine {
  public:
   TANDEM_HD DeepestLine(const Team& team, const BodyPair& bodies, const PieceMemory& memory,
                         const PieceSummary& summary, SearchMemory& shared)
-      : team_(team), bodies_(bodies), memory_(memory), one_region_(summary.curves <= 1), shared_(shared) {}
+      : team_(team), bodies_(bodies), memory_(memory), summary_(summary), shared_(shared) {}
 
   /// Finds places on the curve that lie far from each other: the nearest to the middle, the furthest from
   /// that, and the furthest off the line of these on either side. wanted: 4 at most.
   TANDEM_HD static void find_places(const Team& team, const PieceMemory& memory, std::uint32_t region,
                                     const Vector3& middle, double reach, int wanted, Seeds& out);
 
-  /// Goes from such places to points of the overlap beside them. The first questions, `asked`, are others',
-  /// and are answered too.
-  TANDEM_HD void go_inside(Seeds& seeds, std::uint32_t asked);
+  /// Goes from such places to points of the overlap beside them. middle: of the curve. The first questions,
+  /// `asked`, are others', and are answered too.
+  TANDEM_HD void go_inside(Seeds& seeds, const Vector3& middle, std::uint32_t asked);
 
   /// Takes such points. This comes before the functions below.
   TANDEM_HD void begin(const Seeds& seeds) {
@@ -135,11 +135,11 @@ class DeepestLine {
   const Team& team_;
   const BodyPair& bodies_;
   const PieceMemory& memory_;
+  const PieceSummary& summary_;
   static constexpr int kLines = 4;           ///< of a step: along the proposed line, and straight to its ends
   static constexpr int kBeside = 8;          ///< lines around the best one
   static constexpr std::uint32_t kRing = 2;  ///< the first of their questions
 
-  bool one_region_;
   bool not_convex_ = false;  ///< a body goes on beyond a half-space
   SearchMemory& shared_;
 };
@@ -168,20 +168,36 @@ TANDEM_HD void DeepestLine<Team>::find_places(const Team& team, const PieceMemor
   team.sync();
 }
 
+/// If edges lie in faces, lines from the curve may run along these, or lead out at once. Then places half-way
+/// to the middle of the curve come first: those of convex bodies lie within the overlap.
 template <typename Team>
-TANDEM_HD void DeepestLine<Team>::go_inside(Seeds& seeds, std::uint32_t asked) {
-  const OverlapLines<Team> lines(team_, bodies_, memory_, shared_.lines);
+TANDEM_HD void DeepestLine<Team>::go_inside(Seeds& seeds, const Vector3& middle, std::uint32_t asked) {
+  const OverlapLines<Team> lines(team_, bodies_, memory_, summary_, shared_.lines);
   const int count = seeds.count;
-  for (int i = static_cast<int>(team_.rank()); i < count; i += static_cast<int>(team_.size()))
-    shared_.lines.place[i] = {seeds.at[i], seeds.beside[i]};
+  const std::uint32_t all = (1u << count) - 1;
   const double most = greater(bodies_.a.shape->diagonal, bodies_.b.shape->diagonal);
-  const std::uint32_t found = lines.go_inside(count, most, asked);
+  std::uint32_t found = 0;
+  TANDEM_ROLLED
+  for (int between = summary_.degenerate ? 1 : 0, left = 2 * between + 1; left > 0 && found != all;
+       between = left == 3 ? -1 : 0, --left) {
+    team_.sync();  // all are done with the places
+    for (int i = static_cast<int>(team_.rank()); i < count; i += static_cast<int>(team_.size())) {
+      const Vector3 inwards = i == 0 ? middle : 0.5 * (middle + seeds.at[i]);
+      shared_.lines.place[i] = {between != 0 ? inwards : seeds.at[i], seeds.beside[i]};
+    }
+    const std::uint32_t is_new = lines.go_inside(count, most, asked, between) & ~found;
+    for (int i = static_cast<int>(team_.rank()); i < count; i += static_cast<int>(team_.size())) {
+      if ((is_new >> i & 1u) != 0) seeds.at[i] = shared_.lines.inside[i];
+    }
+    found |= is_new;
+  }
+  team_.sync();
   if (team_.rank() == 0) {
     seeds.count = 0;
     for (int i = 0; i < count; ++i) {
       if ((found >> i & 1u) == 0) continue;
-      seeds.at[seeds.count] = shared_.lines.inside[i];
-      seeds.beside[seeds.count++] = shared_.lines.place[i].piece;
+      seeds.at[seeds.count] = seeds.at[i];
+      seeds.beside[seeds.count++] = seeds.beside[i];
     }
   }
   team_.sync();
@@ -275,7 +291,7 @@ TANDEM_HD void DeepestLine<Team>::begin_half_spaces(const Vector3& middle, doubl
   const PatchFrame& frame = shared_.frame;
   if (team_.rank() == 0) {
     const Vector2 flat = frame.flat(middle);
-    const double half = one_region_ ? far : reach;
+    const double half = summary_.curves <= 1 ? far : reach;
     shared_.steps = 0;
     shared_.spaces.begin(flat, frame.flat(shared_.seeds.at[shared_.from]) - flat, half, frame.height(middle),
                          far);
@@ -390,7 +406,7 @@ TANDEM_HD bool DeepestLine<Team>::learn_from_lines(int from) {
 template <typename Team>
 TANDEM_HD bool DeepestLine<Team>::step(int from) {
   const LineOfTwo& p = shared_.proposed;
-  const OverlapLines<Team> lines(team_, bodies_, memory_, shared_.lines);
+  const OverlapLines<Team> lines(team_, bodies_, memory_, summary_, shared_.lines);
   LineQuestions questions(bodies_, shared_.lines.line);
   const double target = (p.height[0] + p.height[1]) / 2;
   team_.sync();
@@ -493,7 +509,7 @@ TANDEM_HD void DeepestLine<Team>::ask_beside(double radius) {
   const Vector3 within = shared_.frame.at(best.at, middle);
   LineQuestions questions(bodies_, shared_.lines.line);
   team_.sync();  // all have read the answers before
-  OverlapLines<Team>(team_, bodies_, memory_, shared_.lines)
+  OverlapLines<Team>(team_, bodies_, memory_, summary_, shared_.lines)
       .ask_straight(0, shared_.seeds.at[shared_.from], {within, within});
   for (std::uint32_t i = team_.rank(); i < 2 * kBeside; i += team_.size()) {
     const std::uint32_t eighth = i / 2 % 4;  // of a turn; the other four lie opposite

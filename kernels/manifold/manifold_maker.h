@@ -212,10 +212,10 @@ template <typename Team>
 TANDEM_HD void ManifoldMaker<Team>::sound(DepthSearch& search, SearchMemory& shared) {
   const bool has_rim = state_.kind == PatchKind::overlap;
   DeepestLine<Team>(team_, bodies_, memory_, summary_, shared)
-      .go_inside(search.seeds, has_rim ? ask_at_rim(shared.lines) : 0);
+      .go_inside(search.seeds, search.middle, has_rim ? ask_at_rim(shared.lines) : 0);
   if (!has_rim) return;
   take_rim(shared.lines);
-  SheetFinder<Team>(team_, bodies_, memory_, state_).find(search.seeds, shared.lines);
+  SheetFinder<Team>(team_, bodies_, memory_, summary_, state_).find(search.seeds, shared.lines);
 }
 
 template <typename Team>
@@ -265,7 +265,7 @@ TANDEM_HD_CALLED void ManifoldMaker<Team>::end_deep(std::uint32_t region, const 
   team_.sync();
   walk_lines(team_, questions, asked);
   take_rim(lines);
-  SheetFinder<Team>(team_, bodies_, memory_, state_).find(search.seeds, lines);
+  SheetFinder<Team>(team_, bodies_, memory_, summary_, state_).find(search.seeds, lines);
   const bool through = deepest.found() && goes_through(deepest, state_.frame, lines);
   if (team_.rank() == 0) {
     state_.goes_through = through;

@@ -81,6 +81,10 @@ class CurvePlaces {
   const PieceMemory& memory_;
 };
 
+/// Faces of two bodies may lie in each other, and a line that runs in both leaves neither. So lines that go
+/// inside are tilted by this much if corners or edges lie in faces.
+inline constexpr double kTilt = 0.125;
+
 /// Lines that a team follows at once, each in a frame of its own where that is needed.
 struct LineMemory {
   static constexpr int kMost = 20, kMostPlaces = 8;
@@ -97,14 +101,16 @@ class OverlapLines {
  public:
   /// shared: what all of the team see.
   TANDEM_HD OverlapLines(const Team& team, const BodyPair& bodies, const PieceMemory& memory,
-                         LineMemory& shared)
-      : team_(team), bodies_(bodies), memory_(memory), shared_(shared) {}
+                         const PieceSummary& summary, LineMemory& shared)
+      : team_(team), bodies_(bodies), memory_(memory), summary_(summary), shared_(shared) {}
 
   /// Finds a point of the overlap beside each of the first places: half-way from there, behind both
   /// triangles, to where the overlap ends on that line, but no further than `most`. Result: a bit for each
   /// place; 0 where its triangles face each other, or the line is not within both bodies. The first
-  /// questions, `asked`, are others'; with them there are at most LineMemory::kMost.
-  TANDEM_HD std::uint32_t go_inside(int count, double most, std::uint32_t asked = 0) const;
+  /// questions, `asked`, are others'; with them there are at most LineMemory::kMost. Pieces say in which
+  /// direction the lines go, or, if `between` is -1, whence they come; with 1 or -1 the places do not lie on
+  /// their pieces.
+  TANDEM_HD std::uint32_t go_inside(int count, double most, std::uint32_t asked = 0, int between = 0) const;
 
   /// Asks where a straight line within a, and one within b, from one point to two others meet the surface of
   /// the body, if they do so before they are there. The point is within both, perhaps hardly: a line that
@@ -119,6 +125,11 @@ class OverlapLines {
   /// Lines begin so far behind the surface from which they start.
   TANDEM_HD double behind(double length) const { return greater(bodies_.tolerance(), 1e-9 * length); }
 
+  /// Returns a direction in the plane of a triangle that is hardly that of an edge, or across one.
+  TANDEM_HD static Vector3 tangent(const WorldTriangle& t) {
+    return normalized(0.31 * (t.corner[1] - t.corner[0]) + 0.57 * (t.corner[2] - t.corner[0]));
+  }
+
   TANDEM_HD bool leaves(int side, const Crossing& crossing, const Vector3& direction) const {
     return dot(bodies_[side].triangle(crossing.triangle).normal, direction) > 0;
   }
@@ -126,6 +137,7 @@ class OverlapLines {
   const Team& team_;
   const BodyPair& bodies_;
   const PieceMemory& memory_;
+  const PieceSummary& summary_;
   LineMemory& shared_;
 };
 
@@ -159,16 +171,18 @@ TANDEM_HD std::uint32_t CurvePlaces<Team>::least_piece(std::uint32_t begin, std:
 }
 
 template <typename Team>
-TANDEM_HD std::uint32_t OverlapLines<Team>::go_inside(int count, double most, std::uint32_t asked) const {
+TANDEM_HD std::uint32_t OverlapLines<Team>::go_inside(int count, double most, std::uint32_t asked,
+                                                      int between) const {
   LineQuestions questions(bodies_, shared_.line);
   team_.sync();
   for (int i = static_cast<int>(team_.rank()); i < count; i += static_cast<int>(team_.size())) {
     const Place& place = shared_.place[i];
     const Piece& of = memory_.pieces[place.piece];
     // The normals that pieces have are rounded to float32, in another way where the bodies are turned.
-    const Vector3 sum =
-        -(bodies_.a.triangle(of.triangle[0]).normal + bodies_.b.triangle(of.triangle[1]).normal);
-    const double length = norm(sum);
+    const WorldTriangle a = bodies_.a.triangle(of.triangle[0]);
+    Vector3 along = -(a.normal + bodies_.b.triangle(of.triangle[1]).normal);
+    const double length = norm(along);
+    if (summary_.degenerate) along = along + kTilt * tangent(a);
     const auto line = asked + 2 * static_cast<std::uint32_t>(i);
     PatchFrame& frame = shared_.frame[line / 2];
     if (!(length > 1e-3)) {
@@ -177,13 +191,13 @@ TANDEM_HD std::uint32_t OverlapLines<Team>::go_inside(int count, double most, st
       continue;
     }
     Vector3 from = place.at;
-    if (of.kind() == MeetingKind::polygon) {
+    if (between == 0 && of.kind() == MeetingKind::polygon) {
       Meeting meeting;
       meet_again(bodies_, of, meeting);
       from = {};
       for (int k = 0; k < meeting.corners; ++k) from = from + (1.0 / meeting.corners) * meeting.corner[k];
     }
-    frame = PatchFrame(from, (1 / length) * sum);
+    frame = PatchFrame(from, (between < 0 ? -1.0 : 1.0) * normalized(along));
     const double begin = behind(most);
     for (std::uint32_t side = 0; side < 2; ++side)
       questions.ask(line + side, frame, static_cast<int>(side), 0, {}, begin, begin, INFINITY, INFINITY,

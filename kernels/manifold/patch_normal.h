@@ -122,6 +122,7 @@ class NormalFinder {
   int directions_ = 0;
   bool surrounds_hole_ = false;  ///< the curve, and none is joined with it that surrounds it
   bool several_faces_ = false;   ///< face_nearest() had to choose between faces
+  bool is_face_ = false;         ///< face_nearest() chose that of a face
 };
 
 template <typename Team>
@@ -420,7 +421,8 @@ TANDEM_HD Vector3 NormalFinder<Team>::face_nearest(const Vector3& smooth, double
     const Vector3 n = shared_.direction[of_a == 1 ? 0 : first_of_b].n;
     bool flush = false;
     for (int i = 0; i < directions_; ++i) flush = flush || dot(shared_.direction[i].n, n) < kFlush;
-    if (!flush) return dot(n, smooth) > 0 ? n : smooth;
+    is_face_ = !flush && dot(n, smooth) > 0;
+    if (!flush) return is_face_ ? n : smooth;
   }
   if (of_a == kMost || of_b == kMost) find_bearing_faces(smooth, length);
   int count = 0;
@@ -443,6 +445,8 @@ TANDEM_HD Vector3 NormalFinder<Team>::face_nearest(const Vector3& smooth, double
   for (int i = 1; i < count; ++i) {
     if (separation(i) < least) best = i, least = separation(i) * (1 - 1e-9);
   }
+  for (int i = 0; i < directions_; ++i)
+    is_face_ = is_face_ || same_direction(shared_.tried[best], shared_.direction[i].n);
   return shared_.tried[best];
 }
 
@@ -675,8 +679,9 @@ TANDEM_HD PatchNormal NormalFinder<Team>::find(const CurveMeasure& curve) {
   out.n = face_nearest(normalized(curve.by_area ? curve.area : curve.sheet_normal), curve.length);
   // Triangles say along which face the overlap is removed the shortest way only where it is flat.
   if (several_faces_ && height_along(out.n) > kNotFlat * reach_from(curve.middle)) out.kind = PatchKind::deep;
-  // Where faces lie in each other, rounding may leave out a part of the curve, and the area tells nothing.
-  if (summary_.degenerate && separation_along(out.n) > 2 * reach_from(curve.middle))
+  // Where corners or edges lie in faces, rounding may leave out a part of the curve, and the area tells
+  // little.
+  if (summary_.degenerate && (!is_face_ || separation_along(out.n) > 2 * reach_from(curve.middle)))
     out.kind = PatchKind::deep;
   return out;
 }

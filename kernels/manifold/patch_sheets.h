@@ -39,8 +39,8 @@ template <typename Team>
 class SheetFinder {
  public:
   TANDEM_HD SheetFinder(const Team& team, const BodyPair& bodies, const PieceMemory& memory,
-                        PatchState& state)
-      : team_(team), bodies_(bodies), memory_(memory), state_(state) {}
+                        const PieceSummary& summary, PatchState& state)
+      : team_(team), bodies_(bodies), memory_(memory), summary_(summary), state_(state) {}
 
   /// Condition: the rim has been sounded. seeds: points of the overlap.
   TANDEM_HD void find(const Seeds& seeds, LineMemory& lines) {
@@ -62,6 +62,7 @@ class SheetFinder {
   const Team& team_;
   const BodyPair& bodies_;
   const PieceMemory& memory_;
+  const PieceSummary& summary_;
   PatchState& state_;
 };
 
@@ -98,7 +99,7 @@ TANDEM_HD std::uint32_t SheetFinder<Team>::go_beside_rim(LineMemory& lines) cons
     lines.place[i] = {CurvePlaces<Team>::nearest_on(piece, x, kOffEnd * state_.reach), piece_at_rim(i)};
   }
   const double most = greater(bodies_.a.shape->diagonal, bodies_.b.shape->diagonal);
-  return OverlapLines<Team>(team_, bodies_, memory_, lines).go_inside(state_.rim_points, most);
+  return OverlapLines<Team>(team_, bodies_, memory_, summary_, lines).go_inside(state_.rim_points, most);
 }
 
 /// Asks for the surfaces beside a point, along the normal that its piece gives if its triangles face each

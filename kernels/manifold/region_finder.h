@@ -91,7 +91,7 @@ class RegionFinder {
 /// beside a place to beside another one.
 template <typename Team>
 TANDEM_HD bool RegionFinder<Team>::is_joined(std::uint32_t i, std::uint32_t j) {
-  const OverlapLines<Team> lines(team_, bodies_, memory_, shared_->lines);
+  const OverlapLines<Team> lines(team_, bodies_, memory_, summary_, shared_->lines);
   const CurvePlaces<Team> places(team_, memory_);
   const auto nearest = [&](std::uint32_t curve, const Place& from) {
     return places.nearest_place(memory_.start[curve], memory_.start[curve + 1], from.at, reach());

@@ -3,6 +3,7 @@
 #include <cstdio>
 
 #include "manifold_scene.h"
+#include "tandem/kernels/containment_query.h"
 
 /// Manifolds of convex bodies in any pose, beside what the separating axes of the bodies say.
 namespace tandem::test {
@@ -329,6 +330,64 @@ TEST(Ties, OfBoxesOnALatticeAreOverlapsOrTouchesAsTheyAre) {
   }
   EXPECT_GT(overlaps, 300);
   EXPECT_GT(touches, 50);
+}
+
+/// Bodies whose corners, edges and faces lie in each other's in any way: there lines from the curve may run
+/// along faces, or lead out at once.
+TEST(Ties, OfConvexBodiesOnALatticeAreOverlapsOrTouchesAsTheyAre) {
+  RandomPoses random(2);
+  Mesh pyramid = tetrahedron();
+  scale(pyramid, 2);
+  const std::vector<Mesh> meshes = {box(2, 2, 2),
+                                    box(1, 6, 1),
+                                    box(2, 2, 0.5f),
+                                    cube(1, 2),
+                                    pyramid,
+                                    sphere(1, 0),
+                                    sphere(1, 1),
+                                    lens(0.5f),
+                                    regular_prism(4, 1, 2),
+                                    regular_prism(16, 1, 1),
+                                    prism({{-1, -1}, {1, -1}, {-1, 1}}, 1)};
+  const auto place = [&] { return 0.25 * (static_cast<double>(random.below(13)) - 6); };
+  int overlaps = 0, touches = 0, other_depths = 0;
+  for (const Mesh& of_a : meshes) {
+    for (const Mesh& of_b : meshes) {
+      const Axes a(of_a), b(of_b);
+      ManifoldScene scene;
+      scene.add_body(scene.add_shape(of_a), kIdentityPose);
+      scene.add_body(scene.add_shape(of_b), kIdentityPose);
+      for (int trial = 0; trial < trials(20, 20); ++trial) {
+        SCOPED_TRACE(std::to_string(&of_a - meshes.data()) + ", " + std::to_string(&of_b - meshes.data()) +
+                     " " + std::to_string(trial));
+        scene.bodies[0].pose = quarter_turn(random);
+        scene.bodies[1].pose = after(shift(place(), place(), place()), quarter_turn(random));
+        scene.find(trial % 2 == 0 ? kIdentityPose : any_motion(random, 1));
+        if (scene.query.rows().empty()) continue;
+        const ConvexPair pair(a, scene.posed[0].pose, b, scene.posed[1].pose);
+        const bool touch = pair.least() < 1e-6;
+        ++(touch ? touches : overlaps);
+        ASSERT_FALSE(scene.manifolds().empty());
+        const Manifold& m = *std::max_element(scene.manifolds().begin(), scene.manifolds().end(),
+                                              [](const auto& x, const auto& y) { return x.depth < y.depth; });
+        if (touch) {
+          EXPECT_NEAR(m.depth, 0, 1e-12);
+          continue;
+        }
+        if (m.depth == 0) {  // one within the other, which touches it from inside
+          ContainmentQuery contained;
+          ASSERT_EQ(contained.find(scene.scene, scene.query), Status::kOk);
+          ASSERT_EQ(contained.rows().size(), 1u);
+          continue;
+        }
+        const double depth = pair.along(vector_of(m.normal));
+        other_depths += std::fabs(m.depth - depth) > 1e-5 * depth;
+      }
+    }
+  }
+  EXPECT_GT(overlaps, 700);
+  EXPECT_GT(touches, 200);
+  EXPECT_LE(other_depths, overlaps / 500);
 }
 
 /// Found by an audit: two curves of which each was taken for the far side of the other.

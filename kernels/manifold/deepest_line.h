@@ -168,23 +168,30 @@ TANDEM_HD void DeepestLine<Team>::find_places(const Team& team, const PieceMemor
   team.sync();
 }
 
-/// If edges lie in faces, lines from the curve may run along these, or lead out at once. Then places half-way
-/// to the middle of the curve come first: those of convex bodies lie within the overlap.
+/// If edges lie in faces, lines from the curve may run along these, or lead out at once. Then lines from
+/// half-way to the middle of the curve come first, inwards and back: such places lie within the overlap of
+/// convex bodies. If none of these does, a body may lie in the other and touch it from inside, and lines
+/// begin half-way to its middle.
 template <typename Team>
 TANDEM_HD void DeepestLine<Team>::go_inside(Seeds& seeds, const Vector3& middle, std::uint32_t asked) {
   const OverlapLines<Team> lines(team_, bodies_, memory_, summary_, shared_.lines);
   const int count = seeds.count;
   const std::uint32_t all = (1u << count) - 1;
+  const Body& smaller = bodies_[bodies_.a.shape->diagonal < bodies_.b.shape->diagonal ? 0 : 1];
   const double most = greater(bodies_.a.shape->diagonal, bodies_.b.shape->diagonal);
   std::uint32_t found = 0;
+  constexpr int kOnCurve = 3;
   TANDEM_ROLLED
-  for (int between = summary_.degenerate ? 1 : 0, left = 2 * between + 1; left > 0 && found != all;
-       between = left == 3 ? -1 : 0, --left) {
+  for (int round = summary_.degenerate ? 0 : kOnCurve; round <= kOnCurve && found != all; ++round) {
+    if (round == 2 && found != 0) continue;
     team_.sync();  // all are done with the places
     for (int i = static_cast<int>(team_.rank()); i < count; i += static_cast<int>(team_.size())) {
-      const Vector3 inwards = i == 0 ? middle : 0.5 * (middle + seeds.at[i]);
-      shared_.lines.place[i] = {between != 0 ? inwards : seeds.at[i], seeds.beside[i]};
+      Vector3 at = seeds.at[i];
+      if (round < kOnCurve) at = i == 0 ? middle : 0.5 * (middle + at);
+      if (round == 2) at = 0.5 * (smaller.centre + at);
+      shared_.lines.place[i] = {at, seeds.beside[i]};
     }
+    const int between = round == kOnCurve ? 0 : round == 1 ? -1 : 1;
     const std::uint32_t is_new = lines.go_inside(count, most, asked, between) & ~found;
     for (int i = static_cast<int>(team_.rank()); i < count; i += static_cast<int>(team_.size())) {
       if ((is_new >> i & 1u) != 0) seeds.at[i] = shared_.lines.inside[i];

@@ -25,6 +25,9 @@ inline constexpr double kBearing = 0.9;
 /// least.
 inline constexpr double kLeastAlong = 0.1;
 
+/// A triangle turns its back on a direction if the cosine of its normal is below this, but for rounding.
+inline constexpr float kBesidePlane = 1e-5f;
+
 /// Faces of two bodies are flush, as seen from a to b, where the cosine of their normals is below this.
 inline constexpr double kFlush = -0.9995;
 
@@ -90,6 +93,13 @@ class NormalFinder {
   TANDEM_HD_CALLED int find_for_touch(Vector3& n);
   TANDEM_HD_CALLED int find_crossing_edges(Vector3& n) const;
   TANDEM_HD Vector3 crossing_edges(const Piece& piece, int number) const;
+  /// Returns whether a piece's triangle of a body does not turn its back on the other body, which lies along
+  /// n as seen from a.
+  TANDEM_HD bool faces_other(std::uint32_t piece, int side, const FloatVector& n) const {
+    const float* const normals = memory_.normals + 6 * std::size_t{piece};
+    return !bodies_[side].shape->closed || dot(turned_normal(normals, side), n) > -kBesidePlane;
+  }
+  TANDEM_HD bool is_outside(const Vector3& n) const;
   /// Returns the normal that points from a towards b.
   TANDEM_HD static FloatVector turned_normal(const float* normals, int side) {
     const float sign = side == 0 ? 1.0f : -1.0f;
@@ -494,14 +504,17 @@ TANDEM_HD_CALLED int NormalFinder<Team>::find_crossing_edges(Vector3& n) const {
   if (end_ - begin_ > kMostPieces) return 0;
   const double tolerance = kNoArea * bodies_.reach();
   const auto separates = [&](const Vector3& direction, const Vector3& x) {
+    bool outside[2] = {};
     for (std::uint32_t i = begin_; i < end_; ++i) {
       const Piece& piece = memory_.pieces[memory_.order[i]];
+      for (int side = 0; side < 2; ++side)
+        outside[side] = outside[side] || faces_other(memory_.order[i], side, rounded(direction));
       for (int k = 0; k < 3; ++k) {
         if (!(dot(direction, bodies_.a.corner(piece.triangle[0], k) - x) <= tolerance)) return false;
         if (!(dot(direction, bodies_.b.corner(piece.triangle[1], k) - x) >= -tolerance)) return false;
       }
     }
-    return true;
+    return outside[0] && outside[1];
   };
   const std::uint32_t tries = kDirections * (end_ - begin_);
   std::uint64_t key = ~std::uint64_t{0};
@@ -539,6 +552,19 @@ TANDEM_HD_CALLED int NormalFinder<Team>::find_crossing_edges(Vector3& n) const {
   return team_.any(other) ? 2 : 1;
 }
 
+/// Returns whether bodies that a plane separates touch from outside: a body that lies in another one may
+/// touch its surface from behind.
+template <typename Team>
+TANDEM_HD bool NormalFinder<Team>::is_outside(const Vector3& n) const {
+  const FloatVector along = rounded(n);
+  bool outside[2] = {};
+  for (std::uint32_t i = begin_ + team_.rank(); i < end_; i += team_.size()) {
+    for (int side = 0; side < 2; ++side)
+      outside[side] = outside[side] || faces_other(memory_.order[i], side, along);
+  }
+  return team_.any(outside[0]) && team_.any(outside[1]);
+}
+
 /// Looks for a direction, of faces there and else of crossings of edges, that has all of a's triangles there
 /// on one side and b's on the other. Returns how many there are: 0, 1 or, of several, 2. Where several do,
 /// corners or edges lie on each other: nothing to lean on.
@@ -560,6 +586,7 @@ TANDEM_HD_CALLED int NormalFinder<Team>::find_for_touch(Vector3& n) {
     const double height = dot(tried, memory_.pieces[shared_.direction[i].piece].end[0] - summary_.origin);
     if (!(spread.highest_a - height <= tolerance && spread.lowest_b - height >= -tolerance)) continue;
     if (found > 0 && same_direction(n, tried)) continue;
+    if (!is_outside(tried)) continue;
     if (found == 0) n = tried;
     ++found;
   }

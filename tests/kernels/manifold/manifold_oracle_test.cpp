@@ -3,7 +3,6 @@
 #include <cstdio>
 
 #include "manifold_scene.h"
-#include "tandem/kernels/containment_query.h"
 
 /// Manifolds of convex bodies in any pose, beside what the separating axes of the bodies say.
 namespace tandem::test {
@@ -374,12 +373,7 @@ TEST(Ties, OfConvexBodiesOnALatticeAreOverlapsOrTouchesAsTheyAre) {
           EXPECT_NEAR(m.depth, 0, 1e-12);
           continue;
         }
-        if (m.depth == 0) {  // one within the other, which touches it from inside
-          ContainmentQuery contained;
-          ASSERT_EQ(contained.find(scene.scene, scene.query), Status::kOk);
-          ASSERT_EQ(contained.rows().size(), 1u);
-          continue;
-        }
+        ASSERT_GT(m.depth, 0);
         const double depth = pair.along(vector_of(m.normal));
         other_depths += std::fabs(m.depth - depth) > 1e-5 * depth;
       }

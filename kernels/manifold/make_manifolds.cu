@@ -425,12 +425,14 @@ __global__ void __launch_bounds__(kThreads, 3) measure_depths(const __grid_const
     if (begun.is_deep != is_deep || (!is_deep && begun.state.kind != manifold::PatchKind::overlap) ||
         direction >= search.directions)
       return;
-    with_maker(args, team, memory[own], begun.of, [&](auto& maker, PatchState&) {
+    with_maker(args, team, memory[own], begun.of, [&](auto& maker, PatchState& state) {
       const manifold::OverlapLine line = maker.line_along(search, direction, searches[own].get());
-      const bool through = !is_deep && begun.state.bent && line.found() &&
-                           maker.goes_through(line, search, searches[own].get().lines);
+      if (!is_deep) {
+        copy_state(team, begun.state, state);
+        maker.end_overlap(line, searches[own].get().lines);
+        return copy_state(team, state, begun.state);
+      }
       if (team.rank() != 0) return;
-      if (!is_deep) return maker.take_deepest(line, through, memory[own].bodies.get(), begun.state);
       deep_lines(begun).along[direction] = line;
       // Numbers above 0 are in the order of their bits.
       atomicMin(reinterpret_cast<Counter*>(&search.enough),

@@ -425,10 +425,10 @@ TEST(World, ARodThatSpinsFastKeepsItsEnergy) {
   }
 }
 
-// Some heaps keep a box that rocks on its edge.
-TEST(World, MostHeapsComeToRestAndSleep) {
-  int resting = 0;
+// A body that rests on its edge rocks from end to end for ever if only the deepest end is a contact.
+TEST(World, HeapsComeToRestAndSleep) {
   for (const std::uint64_t seed : {1, 2, 3, 4, 5, 6}) {
+    SCOPED_TRACE(seed);
     WorldOnGround scene(box(1, 0.4f, 0.25f));
     RandomPoses random(seed);
     for (int i = 0; i < 40; ++i) {
@@ -438,19 +438,13 @@ TEST(World, MostHeapsComeToRestAndSleep) {
     World& world = scene.begin();
     ASSERT_EQ(world.step(kStep, 900), Status::kOk);
     EXPECT_TRUE(std::all_of(world.bodies().begin() + 1, world.bodies().end(),
-                            [](const BodyMotion& body) { return body.centre[2] > 0.12; }));
-    EXPECT_LT(scene.fastest(), 0.3);
-    if (!std::all_of(world.bodies().begin() + 1, world.bodies().end(),
-                     [](const BodyMotion& body) { return body.sleeps; }))
-      continue;
-    ++resting;
+                            [](const BodyMotion& body) { return body.centre[2] > 0.12 && body.sleeps; }));
     EXPECT_EQ(scene.fastest(), 0);
     const double up[3] = {0, 0, 5};
     ASSERT_EQ(world.push(7, up, world.bodies()[7].centre), Status::kOk);
     EXPECT_FALSE(world.bodies()[7].sleeps);
     EXPECT_NEAR(world.bodies()[7].velocity[2], 5 / world.mass_of(7), 1e-12);
   }
-  EXPECT_GE(resting, 3);
 }
 
 TEST(World, ContinuousMotionBringsNoEnergy) {

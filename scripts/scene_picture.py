@@ -123,85 +123,95 @@ def lit_box(bodies, shown, sun_axes):
     return low, high
 
 
-class Drawing:
-    """Bodies, and the levels of detail that are drawn of them."""
+class Picture:
+    """What OpenGL draws of bodies, seen by a camera: what the samples show, then the shadows, then the light."""
 
-    def __init__(self, bodies, level):
-        self.bodies, self.level = bodies, level
-        self.colour = colours(bodies).astype("f4")
+    def __init__(self, bodies, camera):
+        self.bodies, self.camera = bodies, camera
+        self.distance = (camera.eye - bodies.translation) @ camera.axes[2]
+        self.radius = np.array([np.linalg.norm(shape.points, axis=1).max() for shape in bodies.shapes])[bodies.asset]
+        self.level = levels_drawn(bodies, self.distance, camera.focal)
+        self.colour = colours(bodies)
         flags, first = flags_of_meeting(bodies)
         self.flags = render.context().buffer(flags)
-        self.numbers = np.stack([np.arange(len(first)), first], 1).astype("i4")
+        self.body_and_flags = np.stack([np.arange(len(first)), first], 1)
+        self.seen, self.shadow, self.image = buffers(camera.size)
+        self.meeting = self.seen if bodies.contacts is None else buffer_of_meeting(camera.size)
 
-    def draw(self, program, axes, origin, chosen):
-        """Draws the chosen bodies, those with the greatest z in the frame of these axes first."""
+    def draw_bodies(self, program, axes, origin):
+        """Draws all bodies in the frame of these axes, those with the greatest z first."""
         of, ctx = self.bodies, render.context()
         self.flags.bind_to_storage_buffer(0)
         for asset, shape in enumerate(of.shapes):
             for level, mesh in enumerate(shape.levels):
-                rows = np.nonzero(chosen & (of.asset == asset) & (self.level == level))[0]
+                rows = np.nonzero((of.asset == asset) & (self.level == level))[0]
                 if not len(rows):
                     continue
                 rows = rows[np.argsort(-(of.translation[rows] @ axes[2]), kind="stable")]
                 columns = (axes @ of.rotation[rows]).transpose(0, 2, 1).reshape(-1, 9)
-                pose = np.concatenate([columns, (of.translation[rows] - origin) @ axes.T], 1).astype("f4")
+                pose = np.concatenate([columns, (of.translation[rows] - origin) @ axes.T], 1)
                 (ctx.enable if mesh.closed else ctx.disable)(ctx.CULL_FACE)
-                posed = render.attributes(program, "i", pose=pose, colour=self.colour[rows], body_and_flags=self.numbers[rows])
+                posed = render.attributes(program, "i", pose=pose, colour=self.colour[rows], body_and_flags=self.body_and_flags[rows])
                 corners = render.attributes(program, "v", corner=mesh.points)
                 ctx.vertex_array(program, corners + posed, ctx.buffer(mesh.corners.astype("i4"))).render(instances=len(rows))
 
+    def draw_surfaces(self):
+        """Draws what the samples show, and what they would if there were only triangles that meet others."""
+        near, far = (self.distance - self.radius).min(), (self.distance + self.radius).max()
+        program = render.program("body.vert", "body.frag")
+        render.set_uniforms(program, projection=perspective(self.camera, max(near, 1e-3 * far), far))
+        for buffer, meeting_alone in {self.meeting: True, self.seen: False}.items():
+            buffer.use()
+            render.set_uniforms(program, meeting_alone=meeting_alone)
+            self.draw_bodies(program, self.camera.axes, self.camera.eye)
+
+    def draw_shadows(self, sun_axes):
+        """Draws how far the sunlight reaches. Returns what leads from the world to the map of it, whose coordinates are 0 to 1, and the size of a texel."""
+        low, high = lit_box(self.bodies, in_picture(self.bodies, self.distance, self.radius, self.camera), sun_axes)
+        projection = render.orthographic(low, high)
+        program = render.program("body.vert", "depth.frag")
+        render.set_uniforms(program, projection=projection)
+        self.shadow.use()
+        self.draw_bodies(program, sun_axes, np.zeros(3))
+        to_texture = np.diag([0.5, 0.5, 0.5, 1]) + np.outer([0.5, 0.5, 0.5, 0], [0, 0, 0, 1])
+        return to_texture @ projection @ rigid(sun_axes, np.zeros(3)), (high - low)[:2].max() / SHADOW_TEXELS
+
+    def draw(self):
+        """sRGB bytes, [height, width, 3], of the camera's size divided by SUPERSAMPLING."""
+        ctx, axes = render.context(), self.camera.axes
+        sun = unit(np.array(SUN_FROM) @ axes)
+        right = unit(np.cross([0.0, 0.0, 1.0], sun))
+        self.draw_surfaces()
+        to_shadow, texel = self.draw_shadows(np.array([right, np.cross(sun, right), sun]))
+        diagonal = np.median(self.bodies.diagonals[self.bodies.subject])
+        contacts = self.bodies.contacts is not None
+        program = render.program("whole.vert", "light.frag")
+        textures = [*self.seen.colours, *self.meeting.colours[:2], self.shadow.depth]
+        for place, texture in enumerate(textures):
+            texture.use(place)
+        render.set_uniforms(
+            program, **{name: place for place, name in enumerate(("surface", "shown", "colour", "meeting_surface", "meeting_shown", "shadow"))},
+            focal=self.camera.focal, to_shadow=to_shadow @ np.linalg.inv(rigid(axes, self.camera.eye)), sun=axes @ sun, up=axes[:, 2],
+            # A place r texels away on a plane at an angle t to the light is nearer to it by at most r tan t, and a lift of h clears h / cos t;
+            # r <= BLUR, plus 0.7 within a texel.
+            lift=(BLUR + 0.7) * texel, shadow_blur=BLUR / SHADOW_TEXELS, reach=0.4 * diagonal, glow_reach=diagonal, contacts=contacts,
+            sky_above=of_colour("ffffff" if contacts else SKY_ABOVE), sky_below=of_colour("ffffff" if contacts else SKY_BELOW),
+            contact_colour=of_colour(CONTACT), sun_strength=SUN, ambient=AMBIENT, outline=OUTLINE, glow=GLOW, shine=SHINE)
+        self.image.use()
+        ctx.disable(ctx.DEPTH_TEST | ctx.CULL_FACE)
+        ctx.vertex_array(program, []).render(vertices=3)
+        return self.image.read(0, np.uint8)
+
+
+OF_SAMPLES = (4, "f4"), (2, "i4"), (4, "f2")
+
 
 @functools.cache
-def buffers(size, picture_size):
-    """Two for what the samples show, of all triangles and of those that meet others, the sun's, and that of the picture."""
-    of_samples = ((4, "f4"), (2, "i4"), (4, "f2"))
-    return [render.Buffers(*of) for of in ((size, *of_samples), (size, *of_samples), ((SHADOW_TEXELS,) * 2,), (picture_size, (3, "f1")))]
+def buffers(size):
+    """What the samples show, the shadows, and the picture."""
+    return render.Buffers(size, *OF_SAMPLES), render.Buffers((SHADOW_TEXELS, SHADOW_TEXELS)), render.Buffers(tuple(n // SUPERSAMPLING for n in size), (3, "f1"))
 
 
-def picture(bodies, camera):
-    """sRGB bytes, [height, width, 3], of the camera's size divided by SUPERSAMPLING."""
-    ctx = render.context()
-    seen, meeting, shadow, image = buffers(camera.size, tuple(n // SUPERSAMPLING for n in camera.size))
-    everything, subject = np.ones(len(bodies.asset), bool), bodies.subject
-    diagonal = np.median(bodies.diagonals[subject])
-    distance = (camera.eye - bodies.translation) @ camera.axes[2]
-    drawing = Drawing(bodies, levels_drawn(bodies, distance, camera.focal))
-
-    radius = np.array([np.linalg.norm(shape.points, axis=1).max() for shape in bodies.shapes])[bodies.asset]
-    far = (distance + radius).max()
-    surfaces = render.program("body.vert", "body.frag")
-    render.set_uniforms(surfaces, projection=perspective(camera, max((distance - radius).min(), 1e-3 * far), far))
-    for buffer, meeting_alone in ((seen, False), (meeting, True))[:1 if bodies.contacts is None else 2]:
-        buffer.use()
-        render.set_uniforms(surfaces, meeting_alone=meeting_alone)
-        drawing.draw(surfaces, camera.axes, camera.eye, everything)
-
-    sun = unit(np.array(SUN_FROM) @ camera.axes)
-    right = unit(np.cross([0.0, 0.0, 1.0], sun))
-    sun_axes = np.array([right, np.cross(sun, right), sun])
-    low, high = lit_box(bodies, in_picture(bodies, distance, radius, camera), sun_axes)
-    from_sun = render.orthographic(low, high)
-    depths = render.program("body.vert", "depth.frag")
-    render.set_uniforms(depths, projection=from_sun)
-    shadow.use()
-    drawing.draw(depths, sun_axes, np.zeros(3), everything)
-
-    to_texture = np.diag([0.5, 0.5, 0.5, 1]) + np.outer([0.5, 0.5, 0.5, 0], [0, 0, 0, 1])
-    lights = render.program("whole.vert", "light.frag")
-    render.set_uniforms(
-        lights, focal=camera.focal, sun=camera.axes @ sun, up=camera.axes[:, 2], reach=0.4 * diagonal, glow_reach=diagonal,
-        to_shadow=to_texture @ from_sun @ rigid(sun_axes, np.zeros(3)) @ np.linalg.inv(rigid(camera.axes, camera.eye)),
-        # A place r texels away on a plane at an angle t to the light is nearer to it by at most r tan t, and a lift of h clears h / cos t;
-        # r <= BLUR, plus 0.7 within a texel.
-        lift=(BLUR + 0.7) * (high - low)[:2].max() / SHADOW_TEXELS, shadow_blur=BLUR / SHADOW_TEXELS,
-        contacts=bodies.contacts is not None, sun_strength=SUN, ambient=AMBIENT, outline=OUTLINE, glow=GLOW, shine=SHINE,
-        **{name: of_colour(colour if bodies.contacts is None else "ffffff") for name, colour in (("sky_above", SKY_ABOVE), ("sky_below", SKY_BELOW))},
-        contact_colour=of_colour(CONTACT))
-    textures = dict(zip(("surface", "shown", "colour", "meeting_surface", "meeting_shown"), [*seen.colours, *meeting.colours]), shadow=shadow.depth)
-    for unit_of_texture, (name, texture) in enumerate(textures.items()):
-        texture.use(unit_of_texture)
-        lights[name] = unit_of_texture
-    image.use()
-    ctx.disable(ctx.DEPTH_TEST | ctx.CULL_FACE)
-    ctx.vertex_array(lights, []).render(vertices=3)
-    return image.read(0, np.uint8)
+@functools.cache
+def buffer_of_meeting(size):
+    return render.Buffers(size, *OF_SAMPLES)

@@ -2,7 +2,6 @@
 import functools
 import pathlib
 
-import matplotlib.image
 import numpy as np
 
 SUPERSAMPLING = 3  # samples along each side of a pixel
@@ -29,7 +28,7 @@ def context():
         import moderngl
         made = moderngl.create_context(standalone=True, require=430, backend="egl")
     except Exception as error:  # moderngl's errors have no class of their own
-        raise ValueError(f"pictures need OpenGL 4.3 (Debian: python3-moderngl libegl1 libgl1-mesa-dri): {error}") from error
+        raise ValueError(f"pictures need OpenGL 4.3 (Debian: python3-moderngl libegl1 libgl1 libgl1-mesa-dri): {error}") from error
     made.gc_mode = "auto"  # what Python drops is freed
     return made
 
@@ -93,7 +92,3 @@ def shrink(samples):
     height, width = (n // SUPERSAMPLING for n in samples.shape[:2])
     return samples.reshape(height, SUPERSAMPLING, width, SUPERSAMPLING, -1).mean(axis=(1, 3)).round().astype(np.uint8)
 
-
-def save_png(path, image):
-    # No "Software" field: the bytes depend on what is shown alone.
-    matplotlib.image.imsave(path, image, metadata={"Software": None})

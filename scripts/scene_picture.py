@@ -30,12 +30,15 @@ def of_colour(name):
     return (np.array([int(name[i:i + 2], 16) for i in (0, 2, 4)]) / 255) ** 2.2
 
 
-def colours(bodies):
-    """Linear light that each body reflects; it depends on the number of the body alone."""
+def colours(bodies, stripes=None):
+    """Linear light that each body reflects; it depends on the number of the body alone. stripes: so many ranges of numbers have a colour each."""
     palette = np.array([of_colour(name) for name in COLOURS])
     random = np.random.default_rng(7)
     count = len(bodies.asset)
-    chosen = palette[random.integers(len(palette), size=count)] * random.uniform(0.85, 1.1, size=(count, 1))
+    which = random.integers(len(palette), size=count)
+    if stripes is not None:
+        which = 5 * (np.arange(count) * stripes // count) % len(palette)  # 5: neighbours differ
+    chosen = palette[which] * random.uniform(0.85, 1.1, size=(count, 1))
     ground = GROUND
     if bodies.contacts is not None:
         chosen, ground = PALENESS * of_colour(PALE_BODY) + (1 - PALENESS) * chosen, PALE_GROUND
@@ -126,12 +129,12 @@ def lit_box(bodies, shown, sun_axes):
 class Picture:
     """What OpenGL draws of bodies, seen by a camera: what the samples show, then the shadows, then the light."""
 
-    def __init__(self, bodies, camera):
+    def __init__(self, bodies, camera, stripes=None):
         self.bodies, self.camera = bodies, camera
         self.distance = (camera.eye - bodies.translation) @ camera.axes[2]
         self.radius = np.array([np.linalg.norm(shape.points, axis=1).max() for shape in bodies.shapes])[bodies.asset]
         self.level = levels_drawn(bodies, self.distance, camera.focal)
-        self.colour = colours(bodies)
+        self.colour = colours(bodies, stripes)
         flags, first = flags_of_meeting(bodies)
         self.flags = render.context().buffer(flags)
         self.body_and_flags = np.stack([np.arange(len(first)), first], 1)
@@ -194,7 +197,7 @@ class Picture:
             focal=self.camera.focal, to_shadow=to_shadow @ np.linalg.inv(rigid(axes, self.camera.eye)), sun=axes @ sun, up=axes[:, 2],
             # A place r texels away on a plane at an angle t to the light is nearer to it by at most r tan t, and a lift of h clears h / cos t;
             # r <= BLUR, plus 0.7 within a texel.
-            lift=(BLUR + 0.7) * texel, shadow_blur=BLUR / SHADOW_TEXELS, reach=0.4 * diagonal, glow_reach=diagonal, contacts=contacts,
+            lift=(BLUR + 0.7) * texel, shadow_blur=BLUR / SHADOW_TEXELS, reach=0.4 * diagonal, glow_reach=diagonal, body_size=diagonal, contacts=contacts,
             sky_above=of_colour("ffffff" if contacts else SKY_ABOVE), sky_below=of_colour("ffffff" if contacts else SKY_BELOW),
             contact_colour=of_colour(CONTACT), sun_strength=SUN, ambient=AMBIENT, outline=OUTLINE, glow=GLOW, shine=SHINE)
         self.image.use()

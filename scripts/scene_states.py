@@ -103,11 +103,12 @@ def read_run(path, file, wanted):
                              f"up to {kept[-1]}" if len(kept) > 1 else "keeps the start alone")
     (shapes, asset), fixed = read_shapes(path, file, "bodies"), file["bodies/motion"][:] == 1
     centre = file["bodies/centre_of_mass"][:]
+    position, orientation = file["trajectory/position"], file["trajectory/orientation"]  # which remember chunks as long as they are open
     for row in [kept.index(frame) for frame in wanted or kept[-1:]]:
-        w_last = np.roll(file["trajectory/orientation"][row], -1, axis=1)
+        w_last = np.roll(orientation[row], -1, axis=1)
         rotation = Rotation.from_quat(w_last).as_matrix()
         moved = np.einsum("nij,nj->ni", rotation, centre)
-        yield Bodies(shapes, asset, fixed, rotation, file["trajectory/position"][row] - moved)
+        yield Bodies(shapes, asset, fixed, rotation, position[row] - moved)
 
 
 def read_scene(path, file):
@@ -124,7 +125,7 @@ def read_scene(path, file):
 
 def read(path, wanted=()):
     """What stands where, for each of the frames that are wanted, one at a time: a large run does not fit into memory."""
-    with h5py.File(path) as file:
+    with h5py.File(path, rdcc_nbytes=1 << 26, rdcc_nslots=20011) as file:  # chunks of a thinned run hold many states
         if "trajectory" in file or "bodies" in file:
             yield from read_run(path, file, wanted)
         elif wanted:

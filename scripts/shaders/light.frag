@@ -3,6 +3,7 @@
 const int kSide = 3;  // samples along each side of a pixel
 const int kSamples = kSide * kSide;
 const float kTurn = 6.2831853;
+const float kOutlinedPixels = 40;  // a body of this size has full outlines; they would darken smaller ones as a whole
 
 uniform sampler2D surface;
 uniform isampler2D shown;
@@ -21,6 +22,7 @@ uniform float lift;         // off the surface, which would shade itself otherwi
 uniform float shadow_blur;  // a radius, in the shadow's coordinates
 uniform bool contacts;      // whether triangles that meet others are shown
 uniform vec3 sky_above, sky_below, contact_colour;
+uniform float body_size;    // metres
 uniform float sun_strength, ambient, outline, glow, shine;
 
 out vec4 pixel;
@@ -88,8 +90,9 @@ vec3 light_of(ivec2 at, int sample_index, vec3 backdrop) {
   vec3 from_sun = vec3(1.05, 1, 0.93) * sun_strength * (facing > 0 ? facing * lit(place, normal, sample_index) : 0);
   vec3 from_sky = vec3(0.95, 1, 1.07) * ambient * (0.75 + 0.25 * dot(normal, up)) * openness(at, place, normal, distance, sample_index);
   vec3 light = from_sun + from_sky;
+  float outlined_part = min(1, focal * body_size / (distance * kSide * kOutlinedPixels));
   vec3 reflected = mix(texelFetch(colour, at, 0).rgb, contact_colour, strength);
-  return clamp(reflected * (light + glow * strength * (1 - light)) * (edge ? outline : 1), 0, 1);
+  return clamp(reflected * (light + glow * strength * (1 - light)) * (edge ? mix(1, outline, outlined_part) : 1), 0, 1);
 }
 
 void main() {

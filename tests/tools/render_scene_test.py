@@ -234,6 +234,21 @@ class RenderedRuns(RenderTest):
                 animation.load()
                 self.assertAlmostEqual(animation.info["duration"], 10 / 60 * 1000, delta=10)
 
+    def test_a_thinned_run_looks_the_same(self):
+        run, thinned = self.pile(), self.outputs / "thinned.h5"
+        script = SOURCE_DIR / "scripts/thin_run"
+        self.succeeds(sys.executable, script, run, "-o", thinned, "--precision", "0.001")
+        self.assertLess(thinned.stat().st_size, run.stat().st_size / 2)
+        for whole, part in zip(read(run, [0, 10, 20]), read(thinned, [0, 10, 20]), strict=True):
+            np.testing.assert_allclose(part.rotation, whole.rotation, atol=0.004)
+            np.testing.assert_allclose(part.translation, whole.translation, atol=0.006)
+        self.assertLess(np.abs(self.picture(thinned, "--width", "160") - self.picture(run, "--width", "160")).mean(), 2e-3)
+        self.write_scene([[0, 0, 0]])
+        result = self.run_tool(sys.executable, os.fspath(script), os.fspath(self.scene), "-o", os.fspath(self.scene.with_name("no.h5")))
+        self.assertEqual(result.returncode, UNREADABLE_INPUT)
+        self.assertIn(b"keeps no state", result.stderr)
+        self.assertFalse(self.scene.with_name("no.h5").exists())
+
     def test_what_cannot_be_shown_is_said(self):
         result, _ = self.render(self.pile(), "--frame", "7")
         self.assertEqual(result.returncode, UNREADABLE_INPUT)

@@ -52,6 +52,12 @@ def box_corners(bodies, chosen):
     return corners.reshape(-1, 3)
 
 
+def fixed_points(bodies):
+    """Corners of the triangles of the fixed bodies, [n,3]."""
+    rows = np.nonzero(bodies.fixed)[0]
+    return np.concatenate([np.zeros((0, 3))] + [bodies.shapes[bodies.asset[i]].points @ bodies.rotation[i].T + bodies.translation[i] for i in rows])
+
+
 @dataclasses.dataclass
 class Camera:
     axes: np.ndarray  # rows: right, up, towards the eye

@@ -95,13 +95,19 @@ class DeepestLine {
                       const double& enough);
 
  private:
-  TANDEM_HD void search_from_seeds(const double& enough);
+  /// The lines that are looked at around the best one.
+  struct Ring {
+    double size = 0, radius = 0;  ///< radius: 0 before the first ring
+    double depth = 0;             ///< of the best line when they were looked at
+  };
+
+  TANDEM_HD void search(double reach, bool winds, const double& enough);
   TANDEM_HD bool goes_on_elsewhere() const;
   TANDEM_HD void ask_beside(double radius);
   TANDEM_HD void take_seed_within();
   TANDEM_HD bool refutes_half_spaces() const;
   TANDEM_HD void begin_anew(double radius);
-  TANDEM_HD void look_beside(double reach, const double& enough);
+  TANDEM_HD bool look_beside(double reach, bool winds, Ring& ring);
   TANDEM_HD void begin_half_spaces(const Vector3& middle, double reach);
   TANDEM_HD void learn(int side, const Crossing& surface, HalfSpace& out) const;
   /// Forgets half-spaces beyond which the bodies go on, up to these heights on a line.
@@ -124,7 +130,7 @@ class DeepestLine {
   TANDEM_HD OverlapLine line_that_counts(int from, bool& is_loose) const;
   TANDEM_HD bool learn_from_lines(int from);
   TANDEM_HD bool step(int from);
-  TANDEM_HD void improve(int seed, int most_steps, const double& enough);
+  TANDEM_HD void improve(int seed, int most_steps, bool is_proposed, const double& enough);
 
   const Team& team_;
   const BodyPair& bodies_;
@@ -431,29 +437,49 @@ TANDEM_HD void DeepestLine<Team>::go_to_ends() {
   team_.sync();
 }
 
-/// Looks at the lines that are proposed one after the other, as seen from a seed.
+/// Looks at the lines that are proposed one after the other, as seen from a seed. is_proposed: the first one
+/// is proposed already, whatever else there is to look at.
 template <typename Team>
-TANDEM_HD void DeepestLine<Team>::improve(int seed, int most_steps, const double& enough) {
+TANDEM_HD void DeepestLine<Team>::improve(int seed, int most_steps, bool is_proposed, const double& enough) {
   const Vector3& from = shared_.seeds.at[seed];
-  shared_.spaces.look_from(team_, shared_.frame.flat(from), shared_.frame.height(from));
-  do {
-    propose(seed);
-    if (team_.rank() == 0) see(enough);
-    team_.sync();
-  } while (shared_.proposed.found && shared_.steps < most_steps && !is_deep_enough() && step(seed));
+  bool looks_from_seed = false, goes_on = true;
+  while (goes_on) {
+    if (!is_proposed) {
+      if (!looks_from_seed)
+        shared_.spaces.look_from(team_, shared_.frame.flat(from), shared_.frame.height(from));
+      looks_from_seed = true;
+      propose(seed);
+      if (team_.rank() == 0) see(enough);
+      team_.sync();
+      if (!shared_.proposed.found || shared_.steps >= most_steps || is_deep_enough()) return;
+    }
+    goes_on = step(seed) || is_proposed;
+    is_proposed = false;
+  }
 }
 
-/// Improves the best of the lines through the seeds.
+/// Improves the best of the lines through the seeds, as seen from each of them; then goes on from lines
+/// around the best one, as long as they refute what the half-spaces prove. All of it is one loop, so that a
+/// GPU has its code once: instructions are what it waits for.
 template <typename Team>
-TANDEM_HD void DeepestLine<Team>::search_from_seeds(const double& enough) {
+TANDEM_HD void DeepestLine<Team>::search(double reach, bool winds, const double& enough) {
   const int deepest = shared_.from;
-  for (int i = 0; i < shared_.seeds.count && !is_deep_enough(); ++i) {
-    const int seed = i == 0 ? deepest : i <= deepest ? i - 1 : i;
-    const Vector3& from = shared_.seeds.at[seed];
-    // Where faces of both bodies lie in each other, it may be no point within them.
-    if (shared_.spaces.in_plane(team_, shared_.frame.flat(from), shared_.frame.height(from), rounding()))
-      continue;
-    improve(seed, kMostSteps, enough);
+  int tried = 0;
+  Ring ring;
+  while (!is_deep_enough()) {
+    const bool by_seeds = tried < shared_.seeds.count;
+    int seed = tried == 0 ? deepest : tried <= deepest ? tried - 1 : tried;
+    ++tried;
+    if (by_seeds) {
+      // Where faces of both bodies lie in each other, it may be no point within them.
+      const Vector3& from = shared_.seeds.at[seed];
+      if (shared_.spaces.in_plane(team_, shared_.frame.flat(from), shared_.frame.height(from), rounding()))
+        continue;
+    } else {
+      if (!look_beside(reach, winds, ring)) return;
+      seed = shared_.from;
+    }
+    improve(seed, by_seeds ? kMostSteps : kStepsOfRing, !by_seeds && shared_.proposed.found, enough);
   }
 }
 
@@ -554,23 +580,28 @@ TANDEM_HD void DeepestLine<Team>::begin_anew(double radius) {
   }
 }
 
-/// Looks at lines around the best one, nearer and nearer, and goes on from there if they refute what the
-/// half-spaces prove.
+/// Looks at lines around the best one, if that is worth it, nearer and nearer until they refute what the
+/// half-spaces prove; then the search begins anew there. False if none refutes it.
 template <typename Team>
-TANDEM_HD void DeepestLine<Team>::look_beside(double reach, const double& enough) {
-  // A small curve may be where a large overlap ends.
-  const double size = greater(reach, shared_.best.depth());
-  for (double radius = kFirstRing * size; radius > kLastRing * size && !is_deep_enough();) {
-    const double depth = shared_.best.depth();
-    ask_beside(radius);
-    take_seed_within();
-    if (refutes_half_spaces()) {
-      begin_anew(radius);
-      if (shared_.proposed.found) step(shared_.from);
-      improve(shared_.from, kStepsOfRing, enough);
-    }
-    if (!(shared_.best.depth() > depth * (1 + kRingGain))) radius *= kNextRing;
+TANDEM_HD bool DeepestLine<Team>::look_beside(double reach, bool winds, Ring& ring) {
+  const double depth = shared_.best.depth();
+  if (ring.radius == 0) {
+    if (!(winds || depth > kLooksBeside * reach) || !(not_convex_ || goes_on_elsewhere())) return false;
+    // A small curve may be where a large overlap ends.
+    ring.size = greater(reach, depth);
+    ring.radius = kFirstRing * ring.size;
+  } else if (!(depth > ring.depth * (1 + kRingGain))) {
+    ring.radius *= kNextRing;
   }
+  ring.depth = depth;
+  for (; ring.radius > kLastRing * ring.size; ring.radius *= kNextRing) {
+    ask_beside(ring.radius);
+    take_seed_within();
+    if (!refutes_half_spaces()) continue;
+    begin_anew(ring.radius);
+    return true;
+  }
+  return false;
 }
 
 template <typename Team>
@@ -580,9 +611,7 @@ TANDEM_HD void DeepestLine<Team>::find(const PatchFrame& frame, const Vector3& m
   begin_with_seeds(frame, reach);
   if (!shared_.best.found() || is_deep_enough()) return;
   begin_half_spaces(middle, reach);
-  search_from_seeds(enough);
-  if ((winds || shared_.best.depth() > kLooksBeside * reach) && (not_convex_ || goes_on_elsewhere()))
-    look_beside(reach, enough);
+  search(reach, winds, enough);
   go_to_ends();
 }
 

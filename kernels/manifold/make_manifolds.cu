@@ -22,6 +22,8 @@ using manifold::PieceSummary;
 // of many pieces, and later on each of its warps is one for those of few.
 constexpr std::uint32_t kThreads = 128, kWarps = kThreads / 32, kFinders = 512, kFindingWarps = kFinders / 32;
 using LargeTeam = BlockTeam<kThreads>;
+using FindingTeam = BlockTeam<kFinders, true>;
+using PatchTeam = BlockTeam<kThreads, true>;
 
 /// Memory that teams share, without contents at first.
 template <typename T>
@@ -45,22 +47,28 @@ __device__ void take_rows(const AnyTeam& team, std::uint32_t rows, std::uint32_t
 }
 
 /// Calls of(team, row, 0) for rows below `many`, by blocks, then of(team, row, warp) for rows below `few`, by
-/// warps. walks: of each warp, where teams walk trees.
+/// warps.
 template <std::uint32_t kSize, typename Of>
 __device__ void share_out(std::uint32_t many, std::uint32_t& next_many, std::uint32_t few,
-                          std::uint32_t& next_few, const Of& of, WarpWalks* walks = nullptr) {
+                          std::uint32_t& next_few, const Of& of) {
   __shared__ BlockScratch<kSize> scratch;
   __shared__ std::uint32_t taken[kSize / 32];
-  const BlockTeam<kSize> block(&scratch, walks);
-  take_rows(block, many, next_many, taken[0], [&](std::uint32_t row) { of(block, row, 0u); });
-  __syncthreads();
-  const std::uint32_t own = threadIdx.x / 32;
-  const WarpTeam warp(walks == nullptr ? nullptr : &walks[own]);
-  take_rows(warp, few, next_few, taken[own], [&](std::uint32_t row) { of(warp, row, own); });
+  for (bool by_block = true;;) {
+    const std::uint32_t own = by_block ? 0 : threadIdx.x / 32;
+    const BlockTeam<kSize, true> team(by_block ? &scratch : nullptr, nullptr);
+    if (team.rank() == 0) team.store(taken[own], atomicAdd(by_block ? &next_many : &next_few, 1u));
+    team.sync();
+    const std::uint32_t row = team.load(taken[own]);
+    if (row < (by_block ? many : few)) {
+      of(team, row, own);
+    } else if (!by_block) {
+      return;
+    } else {
+      by_block = false;
+    }
+    team.sync();
+  }
 }
-
-template <typename AnyTeam>
-constexpr bool kIsLarge = AnyTeam::size() != 32;
 
 // Pieces of a curve that a warp takes on. Where there are enough curves for all warps of a GPU, warps do more
 // of them at a time; else blocks are sooner done.
@@ -175,10 +183,9 @@ __global__ void __launch_bounds__(kFinders, 2) find_curves(const __grid_constant
   if (!has_query(args)) return;
   const GpuContactGroups& groups = args.groups;
   ManifoldState& state = *args.state;
-  const auto of = [&](const auto& team, std::uint32_t row, std::uint32_t own) {
-    using AnyTeam = std::remove_cvref_t<decltype(team)>;
-    constexpr std::uint32_t kParts = kIsLarge<AnyTeam> ? 1 : kFindingWarps;
-    const std::uint32_t pair = kIsLarge<AnyTeam> ? groups.many[row] : groups.few[row],
+  const auto of = [&](const FindingTeam& team, std::uint32_t row, std::uint32_t own) {
+    const std::uint32_t parts = team.is_block() ? 1 : kFindingWarps;
+    const std::uint32_t pair = team.is_block() ? groups.many[row] : groups.few[row],
                         count = args.of_pair[pair].pieces.pieces;
     if (count == 0) return;
     if (count > manifold::kMostContactsOfPair) {
@@ -188,16 +195,16 @@ __global__ void __launch_bounds__(kFinders, 2) find_curves(const __grid_constant
     BodyPair& bodies = shared_bodies[own].get();
     if (team.rank() == 0) bodies = bodies_of(args, args.pairs.pairs[pair]);
     PieceMemory pieces = memory_of(args, pair);
-    pieces.near_table = near + own * kNearWords / kParts, pieces.near_words = kNearWords / kParts;
-    if (count <= kNearPieces / kParts) pieces.curve = near + kNearWords + own * kNearPieces / kParts;
+    pieces.near_table = near + own * (kNearWords / parts), pieces.near_words = kNearWords / parts;
+    if (count <= kNearPieces / parts) pieces.curve = near + kNearWords + own * (kNearPieces / parts);
     team.sync();
-    manifold::CurveFinder<AnyTeam> finder(team, bodies, pieces);
+    manifold::CurveFinder<FindingTeam> finder(team, bodies, pieces);
     const PieceSummary summary = finder.find_among(bounds_of(args.of_pair[pair].pieces), next[own]);
     if (team.rank() == 0) {
       args.summaries[pair] = summary;
       if (summary.segments > 0) atomicAdd(&state.segments, Counter{summary.segments});
     }
-    if (!manifold::RegionFinder<AnyTeam>::may_join(summary)) return;
+    if (!manifold::RegionFinder<FindingTeam>::may_join(summary)) return;
     if (team.rank() == 0) next[own] = atomicAdd(&state.several_curves, summary.curves);
     team.sync();
     const std::uint32_t first = next[own];
@@ -335,11 +342,11 @@ template <typename Of>
 __device__ void for_each_patch(const ManifoldArgs& args, std::uint32_t& next_many, std::uint32_t& next_few,
                                const Of& of) {
   const ManifoldState& state = *args.state;
-  const auto of_row = [&](const auto& team, std::uint32_t row, std::uint32_t own) {
-    constexpr bool kMany = kIsLarge<std::remove_cvref_t<decltype(team)>>;
-    const std::uint32_t place = kMany ? row : state.curves_of_many + row;
+  const auto of_row = [&](const PatchTeam& team, std::uint32_t row, std::uint32_t own) {
+    const bool many = team.is_block();
+    const std::uint32_t place = many ? row : state.curves_of_many + row;
     if (place < args.capacity.manifolds)
-      of(team, place, args.curves[kMany ? row : args.capacity.contacts - 1 - row], own);
+      of(team, place, args.curves[many ? row : args.capacity.contacts - 1 - row], own);
   };
   share_out<kThreads>(state.curves_of_many, next_many, state.curves_of_few, next_few, of_row);
 }

@@ -364,68 +364,72 @@ struct BlockScratch {
   Counter part[kMost][kThreads / 32];
 };
 
-template <std::uint32_t kThreads>
+/// A thread block; or, with kOrWarp, that or one of its warps. Which of them is known when it runs, so that a
+/// kernel has the code for both once: instructions are what small scenes wait for.
+template <std::uint32_t kThreads, bool kOrWarp = false>
 struct BlockTeam : TeamOfWarps {
-  BlockScratch<kThreads>* scratch;
-  WarpWalks* walks;  ///< of each warp
+  BlockScratch<kThreads>* scratch;  ///< null for a warp
+  WarpWalks* walks;                 ///< of each warp of the team
 
   __device__ BlockTeam(BlockScratch<kThreads>* of_block, WarpWalks* of_warps)
       : scratch(of_block), walks(of_warps) {}
 
-  __device__ static std::uint32_t rank() { return threadIdx.x; }
-  __device__ static constexpr std::uint32_t size() { return kThreads; }
-  __device__ static void sync() {
-    __syncwarp();  // a warp comes to a barrier as one
-    __syncthreads();
+  __device__ bool is_block() const { return !kOrWarp || scratch != nullptr; }
+  __device__ std::uint32_t rank() const { return is_block() ? threadIdx.x : threadIdx.x % 32; }
+  __device__ std::uint32_t size() const { return is_block() ? kThreads : 32; }
+  __device__ void sync() const {
+    WarpTeam::sync();  // a warp comes to a barrier as one
+    if (is_block()) __syncthreads();
   }
   template <typename T>
   __device__ T sum(T value) const {
-    return over_block(value, Sum());
+    return over_team(value, Sum());
   }
   template <typename T>
   __device__ T least(T value) const {
-    return over_block(value, Least());
+    return over_team(value, Least());
   }
   template <typename T>
   __device__ T greatest(T value) const {
-    return over_block(value, Greatest());
+    return over_team(value, Greatest());
   }
-  __device__ static bool any(bool value) {
-    __syncwarp();
-    return __syncthreads_or(value) != 0;
+  __device__ bool any(bool value) const {
+    const bool of_warp = WarpTeam::any(value);
+    return is_block() ? __syncthreads_or(of_warp) != 0 : of_warp;
   }
 
   template <typename T, int kCount>
   __device__ __forceinline__ void sums(T (&values)[kCount]) const {
-    over_block(values, Sum());
+    over_team(values, Sum());
   }
   template <typename T, int kCount>
   __device__ __forceinline__ void least_ones(T (&values)[kCount]) const {
-    over_block(values, Least());
+    over_team(values, Least());
   }
   template <typename T, int kCount>
   __device__ __forceinline__ void greatest_ones(T (&values)[kCount]) const {
-    over_block(values, Greatest());
+    over_team(values, Greatest());
   }
 
   __device__ void walk_lines(const manifold::LineQuestions& questions, std::uint32_t count) const {
     sync();
-    const std::uint32_t warp = threadIdx.x / 32;
-    walk(walks[warp], questions, count, warp, kThreads / 32);
+    const std::uint32_t warp = rank() / 32;
+    walk(walks[warp], questions, count, warp, size() / 32);
     sync();
   }
 
  private:
   template <typename T, typename Of>
-  __device__ T over_block(T value, Of of) const {
+  __device__ T over_team(T value, Of of) const {
     T values[1] = {value};
-    over_block(values, of);
+    over_team(values, of);
     return values[0];
   }
   template <typename T, int kCount, typename Of>
-  __device__ __forceinline__ void over_block(T (&values)[kCount], Of of) const {
+  __device__ __forceinline__ void over_team(T (&values)[kCount], Of of) const {
     static_assert(sizeof(T) <= sizeof(Counter) && kCount <= BlockScratch<kThreads>::kMost);
     each_over_warp(values, of);
+    if (!is_block()) return;
     const auto part = [&](int i, std::uint32_t warp) -> T& {
       return *reinterpret_cast<T*>(&scratch->part[i][warp]);
     };

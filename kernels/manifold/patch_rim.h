@@ -148,7 +148,7 @@ TANDEM_HD void RimFinder<Team>::furthest(const RimValue (&values)[kWanted], Furt
       if (values[k](c) >= limit[k]) best[k].take(memory_, c.reference);
     }
   }
-  if (Team::size() == 1) return;
+  if (team_.size() == 1) return;
   std::uint64_t own[kWanted], least[kWanted];
   for (int k = 0; k < kWanted; ++k) {
     const bool mine = best[k].reference != kNoIndex;

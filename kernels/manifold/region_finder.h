@@ -242,9 +242,9 @@ TANDEM_HD void RegionFinder<Team>::try_to_join(std::uint32_t curve, int k) {
   // Where all are each other's neighbours, the other way is tried as well.
   if (summary_.curves <= kNeighbours + 1 && comes_first(other, curve)) return;
   // One thread tries one neighbour after the other, and knows which curves are joined by now.
-  if (Team::size() == 1 && first_of(curve) == first_of(other)) return;
+  if (team_.size() == 1 && first_of(curve) == first_of(other)) return;
   if (!is_joined(curve, other) || team_.rank() != 0) return;
-  if (Team::size() == 1) unite(curve, other);
+  if (team_.size() == 1) unite(curve, other);
   team_.set_bits(partners_of(curve, k / 4), (other + 1) << (8 * (k % 4)));
 }
 

@@ -1,12 +1,12 @@
 """Pictures of many bodies: a camera on all of them, a sun with soft shadows, a sky that less open places see less of."""
 import dataclasses
+import functools
 
 import numpy as np
 
 import render
-from render import unit
+from render import SUPERSAMPLING, unit
 
-SUPERSAMPLING = 3
 MARGIN = 0.03  # of the width, on either side
 FIELD_OF_VIEW = np.radians(24)
 COLOURS = ("bf826e", "d4ad7a", "9da985", "789997", "8294ac", "9f8aa3", "c69da1", "bcb693", "90a7b8", "a88673",
@@ -20,8 +20,9 @@ CONTACT = "c00018"  # of triangles that meet others; bodies and ground are then 
 GLOW = 0.85  # the light on these triangles that no shadow takes away
 SHINE = 0.92  # the share of their colour that shines through a body that hides them closely
 PALE_BODY, PALE_GROUND, PALENESS = "f4f5f6", "ffffff", 0.5
-SHADOW_PIXELS = 2048
-BODIES_AT_ONCE = 4096
+SHADOW_TEXELS = 4096
+BLUR = 2.5  # the radius of a shadow's edge, in texels
+ERROR_SEEN = 0.5  # pixels: a coarser level of detail is drawn where it differs by less
 
 
 def of_colour(name):
@@ -29,31 +30,19 @@ def of_colour(name):
     return (np.array([int(name[i:i + 2], 16) for i in (0, 2, 4)]) / 255) ** 2.2
 
 
-def colours(bodies):
-    """Linear light that each body reflects; it depends on the number of the body alone."""
+def colours(bodies, stripes=None):
+    """Linear light that each body reflects; it depends on the number of the body alone. stripes: so many ranges of numbers have a colour each."""
     palette = np.array([of_colour(name) for name in COLOURS])
     random = np.random.default_rng(7)
     count = len(bodies.asset)
-    chosen = palette[random.integers(len(palette), size=count)] * random.uniform(0.85, 1.1, size=(count, 1))
+    which = random.integers(len(palette), size=count)
+    if stripes is not None:
+        which = 5 * (np.arange(count) * stripes // count) % len(palette)  # 5: neighbours differ
+    chosen = palette[which] * random.uniform(0.85, 1.1, size=(count, 1))
     ground = GROUND
     if bodies.contacts is not None:
         chosen, ground = PALENESS * of_colour(PALE_BODY) + (1 - PALENESS) * chosen, PALE_GROUND
     return np.where(bodies.fixed[:, None], of_colour(ground), np.minimum(chosen, 1))
-
-
-def posed(bodies, chosen):
-    """All triangles of the chosen bodies in the world, the body of each, whether it is of a closed shape, and whether it meets others; of the ground none does."""
-    found, body, closed, meets = [np.zeros((0, 3, 3))], [np.zeros(0, int)], [np.zeros(0, bool)], [np.zeros(0, bool)]
-    for asset, shape in enumerate(bodies.shapes):
-        rows = np.nonzero((bodies.asset == asset) & chosen)[0]
-        triangles = np.einsum("nij,tkj->ntki", bodies.rotation[rows], shape.triangles, optimize=True)
-        triangles += bodies.translation[rows, None, None]
-        found.append(triangles.reshape(-1, 3, 3))
-        body.append(np.repeat(rows, len(shape.triangles)))
-        closed.append(np.full(len(body[-1]), shape.closed))
-        meets.append(np.zeros(len(body[-1]), bool) if bodies.contacts is None else bodies.contacts[rows][:, shape.face].ravel())
-    body, meets = np.concatenate(body), np.concatenate(meets)
-    return np.concatenate(found), body, np.concatenate(closed), meets & bodies.subject[body]
 
 
 def box_corners(bodies, chosen):
@@ -63,44 +52,18 @@ def box_corners(bodies, chosen):
     return corners.reshape(-1, 3)
 
 
-def not_hidden(bodies, chosen, project, size):
-    """Which of the chosen bodies are not surely hidden by nearer ones. Few are all asked for; many come front first, some at a time."""
-    rows = np.nonzero(chosen)[0]
-    if len(rows) <= BODIES_AT_ONCE or bodies.contacts is not None:
-        return chosen
-    corners = project(box_corners(bodies, chosen)).reshape(-1, 8, 3)
-    low, high = (np.floor(edge).astype(int) for edge in (corners[..., :2].min(axis=1), corners[..., :2].max(axis=1)))
-    nearest = corners[..., 2].max(axis=1)
-    depth, shown = np.full((size[1], size[0]), -np.inf), np.zeros(len(chosen), bool)
-    order = np.argsort(-nearest, kind="stable")
-    for some in (order[i:i + BODIES_AT_ONCE] for i in range(0, len(order), BODIES_AT_ONCE)):
-        some = some[~render.is_behind(depth, low[some], high[some], nearest[some])]
-        here = np.zeros(len(chosen), bool)
-        here[rows[some]] = True
-        shown |= here
-        depth = np.maximum(depth, render.rasterise(project(posed(bodies, here)[0]), size)[0])
-    return shown
+def fixed_points(bodies):
+    """Corners of the triangles of the fixed bodies, [n,3]."""
+    rows = np.nonzero(bodies.fixed)[0]
+    return np.concatenate([np.zeros((0, 3))] + [bodies.shapes[bodies.asset[i]].points @ bodies.rotation[i].T + bodies.translation[i] for i in rows])
 
 
 @dataclasses.dataclass
 class Camera:
     axes: np.ndarray  # rows: right, up, towards the eye
     eye: np.ndarray
-    focal: float  # the width in pixels of something as wide as it is far away
-    size: tuple
-
-    def seen(self, points):
-        """In the camera's frame; the third is the distance."""
-        return (points - self.eye) @ (self.axes * [[1], [1], [-1]]).T
-
-    def project(self, points):
-        """x and y in pixels, and the inverse of the distance, which is linear on the screen."""
-        seen = self.seen(points)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            inverse = 1 / seen[..., 2]
-            x = self.size[0] / 2 + self.focal * seen[..., 0] * inverse
-            y = self.size[1] / 2 - self.focal * seen[..., 1] * inverse
-        return np.stack([x, y, inverse], -1)
+    focal: float  # the width in samples of something as wide as it is far away
+    size: tuple  # in samples
 
 
 def camera_on(points, axes, size):
@@ -117,142 +80,147 @@ def camera_on(points, axes, size):
     return Camera(axes, np.append(middle, distance) @ axes, focal, size)
 
 
-def visible(triangles, closed, camera):
-    """Triangles in front of the eye that can be seen: those of closed shapes only from outside."""
-    faces_eye = np.einsum("ni,ni->n", area_vectors(triangles), camera.eye - triangles[:, 0]) > 0
-    nearest = 1e-3 * np.linalg.norm(camera.eye - triangles.mean(axis=(0, 1)))
-    in_front = camera.seen(triangles)[..., 2].min(axis=1) > nearest
-    return np.nonzero((faces_eye | ~closed) & in_front)[0]
+def rigid(axes, origin):
+    """From the world to the frame of these axes, whose rows are in the world, at the origin."""
+    matrix = np.eye(4)
+    matrix[:3, :3], matrix[:3, 3] = axes, -axes @ origin
+    return matrix
 
 
-def area_vectors(triangles):
-    return np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+def perspective(camera, near, far):
+    x, y = 2 * camera.focal / np.array(camera.size)
+    return np.array([[x, 0, 0, 0], [0, y, 0, 0], [0, 0, -(far + near) / (far - near), -2 * far * near / (far - near)], [0, 0, -1, 0]])
 
 
-@dataclasses.dataclass
-class Samples:
-    """What the samples of a picture show that show anything: rows are samples, in the order of the picture."""
-    covered: np.ndarray  # bool [height, width]
-    row: np.ndarray
-    column: np.ndarray
-    distance: np.ndarray  # along the camera's axis
-    point: np.ndarray
-    normal: np.ndarray  # towards the eye
-    triangle: np.ndarray
-    body: np.ndarray
+def levels_drawn(bodies, distance, focal):
+    """The level of each body that is drawn: the coarsest that differs too little to be seen. With contacts, which are of the finest, that one."""
+    level = np.zeros(len(bodies.asset), int)
+    if bodies.contacts is None:
+        for asset, shape in enumerate(bodies.shapes):
+            error = np.maximum.accumulate([mesh.error for mesh in shape.levels])[1:]
+            here = bodies.asset == asset
+            level[here] = np.searchsorted(error, ERROR_SEEN * SUPERSAMPLING * distance[here] / focal)
+    return level
 
 
-def take_samples(triangles, body, closed, camera):
-    kept = visible(triangles, closed, camera)
-    depth, nearest = render.rasterise(camera.project(triangles[kept]), camera.size)
-    covered = nearest >= 0
-    row, column = np.nonzero(covered)
-    distance = 1 / depth[covered]
-    on_plane = np.stack([(column + 0.5 - camera.size[0] / 2) / camera.focal,
-                         (row + 0.5 - camera.size[1] / 2) / camera.focal, np.ones(len(row))], 1)
-    point = ((on_plane * distance[:, None]) @ (camera.axes * [[1], [-1], [-1]]) + camera.eye).astype(np.float32)
-    normals = unit(area_vectors(triangles[kept]))
-    normals *= np.where(np.einsum("ni,ni->n", normals, camera.eye - triangles[kept, 0]) < 0, -1, 1)[:, None]
-    chosen = nearest[covered]
-    return Samples(covered, row, column, distance, point, normals.astype(np.float32)[chosen], kept[chosen], body[kept][chosen])
+def flags_of_meeting(bodies):
+    """Whether each triangle meets others, of all bodies that have such, and where the flags of each body begin (-1: it has none)."""
+    flags, first, count = [np.zeros(1, "u4")], np.full(len(bodies.asset), -1, "i4"), 1
+    if bodies.contacts is not None:
+        for row in np.nonzero(bodies.subject & bodies.contacts.any(axis=1))[0]:
+            flags.append(bodies.contacts[row][bodies.shapes[bodies.asset[row]].face].astype("u4"))
+            first[row], count = count, count + len(flags[-1])
+    return np.concatenate(flags), first
 
 
-def lit(samples, bodies, light):
-    """Which samples see the light; shadows are soft once the samples of a pixel are averaged."""
-    right = unit(np.cross([0.0, 0.0, 1.0], light))
-    axes = np.array([right, np.cross(light, right), light])
-    seen = box_corners(bodies, bodies.subject) @ axes.T
-    low, high = seen.min(axis=0), seen.max(axis=0)
-    scale, size = SHADOW_PIXELS / (high - low)[:2].max(), (SHADOW_PIXELS, SHADOW_PIXELS)
-    project = lambda points: (points @ axes.T - low) * [scale, scale, 1]
-    casters = posed(bodies, not_hidden(bodies, bodies.subject, project, size))[0]
-    depth, _ = render.rasterise(project(casters[area_vectors(casters) @ light > 0]), size)
-    # Samples are lifted off their surface, which would shade itself otherwise: a place r pixels away on a plane at an angle t
-    # to the light is nearer to it by at most r tan t, and a lift of h clears h / cos t; r <= 2.5, plus 0.7 within a pixel.
-    lifted = samples.point + samples.normal * np.float32(3.2 / scale)
-    at = lifted @ axes.T.astype(np.float32) - low.astype(np.float32)
-    # Each sample looks at a place of its own on a small disc; the places are a low-discrepancy sequence.
-    index = np.arange(len(at))
-    radius, angle = 2.5 * np.sqrt(index * 0.754877 % 1), 2 * np.pi * (index * 0.569840 % 1)
-    column = np.floor(at[:, 0] * scale + radius * np.cos(angle)).astype(int)
-    row = np.floor(at[:, 1] * scale + radius * np.sin(angle)).astype(int)
-    inside = (np.minimum(column, row) >= 0) & (np.maximum(column, row) < SHADOW_PIXELS)
-    return ~(inside & (depth[np.where(inside, row, 0), np.where(inside, column, 0)] > at[:, 2]))
+def in_picture(bodies, distance, radius, camera):
+    """Whether the balls around the bodies reach into the picture, or nearly."""
+    aside = np.abs((bodies.translation - camera.eye) @ camera.axes[:2].T) - radius[:, None]
+    return (aside <= np.maximum(distance + radius, 0)[:, None] * np.array(camera.size) / 2 / camera.focal).all(axis=1)
 
 
-def openness(samples, reach, camera):
-    """Part of the sky that nothing within reach hides, judged by what the picture shows. Each sample of a pixel looks
-    along directions of its own."""
-    height, width = samples.covered.shape
-    position = np.full((height * width, 3), np.float32(1e9))
-    position[samples.covered.ravel()] = samples.point
-    pixels = camera.focal * reach / samples.distance
-    place = (samples.column % SUPERSAMPLING) * SUPERSAMPLING + samples.row % SUPERSAMPLING
-    hidden = np.zeros(len(pixels), np.float32)
-    directions, steps = 3, 3
-    for k in range(directions):
-        angle = 2 * np.pi * (place / SUPERSAMPLING ** 2 + k) / directions
-        right, down = pixels * np.cos(angle), pixels * np.sin(angle)
-        highest = np.zeros(len(pixels), np.float32)
-        for step in range(1, steps + 1):
-            away = (step / steps) ** 1.5
-            x = np.clip((samples.column + away * right).astype(np.int32), 0, width - 1)
-            y = np.clip((samples.row + away * down).astype(np.int32), 0, height - 1)
-            ray = position[y * width + x] - samples.point
-            length = np.sqrt(np.einsum("ni,ni->n", ray, ray)) + np.float32(1e-9)
-            rise = np.einsum("ni,ni->n", ray, samples.normal) / length - np.float32(0.08)
-            highest = np.maximum(highest, rise * np.clip(2 - length / np.float32(reach), 0, 1))
-        hidden += np.maximum(highest, 0)
-    return 1 - hidden / directions
+def lit_box(bodies, shown, sun_axes):
+    """The least and greatest coordinates, in the sun's frame, of what the map of shadows is of: across the sunlight all that is shown and can be in a
+    body's shadow, along it everything."""
+    corners = box_corners(bodies, np.ones(len(shown), bool)).reshape(-1, 8, 3) @ sun_axes.T
+    lows, highs = corners.min(axis=1), corners.max(axis=1)
+    low, high = lows.min(axis=0), highs.max(axis=0)
+    for of in (bodies.subject, shown):
+        if of.any():
+            low[:2] = np.maximum(low[:2], lows[of, :2].min(axis=0))
+            high[:2] = np.minimum(high[:2], highs[of, :2].max(axis=0))
+    return low, high
 
 
-def outlines(samples, contact):
-    """Samples whose right or lower neighbour shows another body, or another triangle that meets others."""
-    shown = np.full(samples.covered.shape, -1)
-    shown[samples.covered] = np.where(contact >= 0, samples.body.max(initial=0) + 1 + contact, samples.body)
-    ends = np.zeros(shown.shape, bool)
-    ends[:, :-1] |= shown[:, :-1] != shown[:, 1:]
-    ends[:-1] |= shown[:-1] != shown[1:]
-    return ends[samples.covered]
+class Picture:
+    """What OpenGL draws of bodies, seen by a camera: what the samples show, then the shadows, then the light."""
+
+    def __init__(self, bodies, camera, stripes=None):
+        self.bodies, self.camera = bodies, camera
+        self.distance = (camera.eye - bodies.translation) @ camera.axes[2]
+        self.radius = np.array([np.linalg.norm(shape.points, axis=1).max() for shape in bodies.shapes])[bodies.asset]
+        self.level = levels_drawn(bodies, self.distance, camera.focal)
+        self.colour = colours(bodies, stripes)
+        flags, first = flags_of_meeting(bodies)
+        self.flags = render.context().buffer(flags)
+        self.body_and_flags = np.stack([np.arange(len(first)), first], 1)
+        self.seen, self.shadow, self.image = buffers(camera.size)
+        self.meeting = self.seen if bodies.contacts is None else buffer_of_meeting(camera.size)
+
+    def draw_bodies(self, program, axes, origin):
+        """Draws all bodies in the frame of these axes, those with the greatest z first."""
+        of, ctx = self.bodies, render.context()
+        self.flags.bind_to_storage_buffer(0)
+        for asset, shape in enumerate(of.shapes):
+            for level, mesh in enumerate(shape.levels):
+                rows = np.nonzero((of.asset == asset) & (self.level == level))[0]
+                if not len(rows):
+                    continue
+                rows = rows[np.argsort(-(of.translation[rows] @ axes[2]), kind="stable")]
+                columns = (axes @ of.rotation[rows]).transpose(0, 2, 1).reshape(-1, 9)
+                pose = np.concatenate([columns, (of.translation[rows] - origin) @ axes.T], 1)
+                (ctx.enable if mesh.closed else ctx.disable)(ctx.CULL_FACE)
+                posed = render.attributes(program, "i", pose=pose, colour=self.colour[rows], body_and_flags=self.body_and_flags[rows])
+                corners = render.attributes(program, "v", corner=mesh.points)
+                ctx.vertex_array(program, corners + posed, ctx.buffer(mesh.corners.astype("i4"))).render(instances=len(rows))
+
+    def draw_surfaces(self):
+        """Draws what the samples show, and what they would if there were only triangles that meet others."""
+        near, far = (self.distance - self.radius).min(), (self.distance + self.radius).max()
+        program = render.program("body.vert", "body.frag")
+        render.set_uniforms(program, projection=perspective(self.camera, max(near, 1e-3 * far), far))
+        for buffer, meeting_alone in {self.meeting: True, self.seen: False}.items():
+            buffer.use()
+            render.set_uniforms(program, meeting_alone=meeting_alone)
+            self.draw_bodies(program, self.camera.axes, self.camera.eye)
+
+    def draw_shadows(self, sun_axes):
+        """Draws how far the sunlight reaches. Returns what leads from the world to the map of it, whose coordinates are 0 to 1, and the size of a texel."""
+        low, high = lit_box(self.bodies, in_picture(self.bodies, self.distance, self.radius, self.camera), sun_axes)
+        projection = render.orthographic(low, high)
+        program = render.program("body.vert", "depth.frag")
+        render.set_uniforms(program, projection=projection)
+        self.shadow.use()
+        self.draw_bodies(program, sun_axes, np.zeros(3))
+        to_texture = np.diag([0.5, 0.5, 0.5, 1]) + np.outer([0.5, 0.5, 0.5, 0], [0, 0, 0, 1])
+        return to_texture @ projection @ rigid(sun_axes, np.zeros(3)), (high - low)[:2].max() / SHADOW_TEXELS
+
+    def draw(self):
+        """sRGB bytes, [height, width, 3], of the camera's size divided by SUPERSAMPLING."""
+        ctx, axes = render.context(), self.camera.axes
+        sun = unit(np.array(SUN_FROM) @ axes)
+        right = unit(np.cross([0.0, 0.0, 1.0], sun))
+        self.draw_surfaces()
+        to_shadow, texel = self.draw_shadows(np.array([right, np.cross(sun, right), sun]))
+        diagonal = np.median(self.bodies.diagonals[self.bodies.subject])
+        contacts = self.bodies.contacts is not None
+        program = render.program("whole.vert", "light.frag")
+        textures = [*self.seen.colours, *self.meeting.colours[:2], self.shadow.depth]
+        for place, texture in enumerate(textures):
+            texture.use(place)
+        render.set_uniforms(
+            program, **{name: place for place, name in enumerate(("surface", "shown", "colour", "meeting_surface", "meeting_shown", "shadow"))},
+            focal=self.camera.focal, to_shadow=to_shadow @ np.linalg.inv(rigid(axes, self.camera.eye)), sun=axes @ sun, up=axes[:, 2],
+            # A place r texels away on a plane at an angle t to the light is nearer to it by at most r tan t, and a lift of h clears h / cos t;
+            # r <= BLUR, plus 0.7 within a texel.
+            lift=(BLUR + 0.7) * texel, shadow_blur=BLUR / SHADOW_TEXELS, reach=0.4 * diagonal, glow_reach=diagonal, body_size=diagonal, contacts=contacts,
+            sky_above=of_colour("ffffff" if contacts else SKY_ABOVE), sky_below=of_colour("ffffff" if contacts else SKY_BELOW),
+            contact_colour=of_colour(CONTACT), sun_strength=SUN, ambient=AMBIENT, outline=OUTLINE, glow=GLOW, shine=SHINE)
+        self.image.use()
+        ctx.disable(ctx.DEPTH_TEST | ctx.CULL_FACE)
+        ctx.vertex_array(program, []).render(vertices=3)
+        return self.image.read(0, np.uint8)
 
 
-def shown_contacts(samples, triangles, meets, reach, camera):
-    """How strongly the samples show a triangle that meets others, and which (-1: none): in full one that is seen, less one that is hidden, the farther
-    behind it lies."""
-    found = np.nonzero(meets)[0]
-    depth, nearest = render.rasterise(camera.project(triangles[found]), camera.size)
-    depth, nearest = depth[samples.covered], nearest[samples.covered]
-    with np.errstate(divide="ignore"):
-        strength = np.where(nearest >= 0, SHINE * np.clip(2 - 2 * (1 / depth - samples.distance) / reach, 0, 1), 0)
-    hidden = np.where(strength > 0, np.append(found, -1)[nearest], -1)
-    seen = meets[samples.triangle]
-    return np.where(seen, 1, strength), np.where(seen, samples.triangle, hidden)
+OF_SAMPLES = (4, "f4"), (2, "i4"), (4, "f2")
 
 
-def backdrop(size, white):
-    if white:
-        return np.ones((size[1], size[0], 3))
-    down = np.linspace(0, 1, size[1])[:, None]
-    rows = (1 - down) * of_colour(SKY_ABOVE) + down * of_colour(SKY_BELOW)
-    return np.repeat(rows[:, None], size[0], axis=1)
+@functools.cache
+def buffers(size):
+    """What the samples show, the shadows, and the picture."""
+    return render.Buffers(size, *OF_SAMPLES), render.Buffers((SHADOW_TEXELS, SHADOW_TEXELS)), render.Buffers(tuple(n // SUPERSAMPLING for n in size), (3, "f1"))
 
 
-def picture(bodies, camera):
-    """sRGB in 0 to 1, [height, width, 3], of the camera's size divided by SUPERSAMPLING."""
-    everything = np.ones(len(bodies.asset), bool)
-    triangles, body, closed, meets = posed(bodies, not_hidden(bodies, everything, camera.project, camera.size))
-    samples = take_samples(triangles, body, closed, camera)
-    light = unit(np.array(SUN_FROM) @ camera.axes)
-    subject = bodies.subject
-    diagonal = np.median(bodies.diagonals[subject])
-    sun = SUN * np.clip(samples.normal @ light, 0, 1) * lit(samples, bodies, light)
-    sky = AMBIENT * (0.75 + 0.25 * samples.normal[:, 2])
-    sky *= openness(samples, 0.4 * diagonal, camera)
-    light_here = sun[:, None] * [1.05, 1.0, 0.93] + sky[:, None] * [0.95, 1.0, 1.07]
-    strength, contact = shown_contacts(samples, triangles, meets, diagonal, camera)
-    strength = strength[:, None]
-    reflected = (1 - strength) * colours(bodies)[samples.body] + strength * of_colour(CONTACT)
-    image = backdrop(camera.size, bodies.contacts is not None)
-    image[samples.covered] = reflected * (light_here + GLOW * strength * (1 - light_here))
-    image[samples.covered] *= np.where(outlines(samples, contact), OUTLINE, 1)[:, None]
-    return render.shrink(np.clip(image, 0, 1), SUPERSAMPLING) ** (1 / 2.2)
+@functools.cache
+def buffer_of_meeting(size):
+    return render.Buffers(size, *OF_SAMPLES)

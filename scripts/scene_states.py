@@ -31,14 +31,29 @@ class Bodies:
 
 
 @dataclasses.dataclass
-class Shape:
-    triangles: np.ndarray  # [t,3,3]
+class Mesh:
+    points: np.ndarray  # [p,3]
+    corners: np.ndarray  # [t,3]: points
     closed: bool
     face: np.ndarray  # [t]: of the source file
+    error: float  # no point is farther than this from the mesh of which it is a level of detail
+
+
+@dataclasses.dataclass
+class Shape:
+    levels: list  # Mesh: the one that a body has, then coarser ones
+
+    @property
+    def points(self):
+        return self.levels[0].points
+
+    @property
+    def face(self):
+        return self.levels[0].face
 
     @property
     def box(self):
-        low, high = (self.triangles.min(axis=(0, 1)), self.triangles.max(axis=(0, 1)))
+        low, high = self.points.min(axis=0), self.points.max(axis=0)
         return np.array([[(low, high)[i >> k & 1][k] for k in range(3)] for i in range(8)])
 
     @property
@@ -46,39 +61,38 @@ class Shape:
         return np.linalg.norm(self.box[7] - self.box[0])
 
 
-def is_closed(triangles):
+def is_closed(corners):
     """Whether every edge has its opposite, so that a face is never seen from behind."""
-    points, corner = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
-    start = corner.reshape(-1, 3)
-    end = np.roll(start, -1, axis=1)
-    there, back = start * len(points) + end, end * len(points) + start
+    start, end = corners, np.roll(corners, -1, axis=1)
+    there, back = start * (corners.max() + 1) + end, end * (corners.max() + 1) + start
     return np.array_equal(np.sort(there, axis=None), np.sort(back, axis=None))
 
 
-def read_file(path, level=0):
+def read_mesh(path, level):
     try:
-        return bvh_file.read(path, level)
+        file = bvh_file.read(path, level)
     except (AssertionError, KeyError, struct.error) as error:
         raise ValueError(f"{path}: not a .bvh file that can be read") from error
+    points, corners = np.unique(file.world.reshape(-1, 3), axis=0, return_inverse=True)
+    corners = corners.reshape(-1, 3)
+    return Mesh(points, corners, is_closed(corners), file.source_face, file.levels[level]["error_bound"]), len(file.levels)
 
 
 def read_shape(path, level):
-    file = read_file(path, level)
-    return Shape(file.world, is_closed(file.world), file.source_face)
+    first, count = read_mesh(path, level)
+    return Shape([first] + [read_mesh(path, k)[0] for k in range(level + 1, count)])
 
 
-def read_shapes(path, file, group, at_level):
-    """The shapes of the bodies in a group, /instances or /bodies, and which of them each body has: one for each asset and level of detail in use, or at_level."""
+def read_shapes(path, file, group):
+    """The shapes of the bodies in a group, /instances or /bodies, and which of them each body has: one for each asset and level of detail in use."""
     names = [name.decode() if isinstance(name, bytes) else name for name in file["assets"][:]]
     asset = file[f"{group}/asset"][:].astype(int)
     level = file[f"{group}/level"][:].astype(int) if f"{group}/level" in file else np.zeros(len(asset), int)
-    if at_level is not None:
-        level = np.array([min(at_level, len(read_file(path.parent / name).levels) - 1) for name in names])[asset]
     used, of_each = np.unique(np.stack([asset, level], 1), axis=0, return_inverse=True)
     return [read_shape(path.parent / names[row], at) for row, at in used.tolist()], of_each.reshape(-1)
 
 
-def read_run(path, file, wanted, level):
+def read_run(path, file, wanted):
     """The states after the wanted numbers of steps, or the last state where no number is wanted."""
     kept = file["trajectory/frame"][:].tolist() if "trajectory" in file else []
     if not kept:
@@ -87,19 +101,18 @@ def read_run(path, file, wanted, level):
         if frame not in kept:
             raise ValueError(f"does not keep the state after step {frame}, but every {kept[1] - kept[0]}th "
                              f"up to {kept[-1]}" if len(kept) > 1 else "keeps the start alone")
-    (shapes, asset), fixed = read_shapes(path, file, "bodies", level), file["bodies/motion"][:] == 1
+    (shapes, asset), fixed = read_shapes(path, file, "bodies"), file["bodies/motion"][:] == 1
     centre = file["bodies/centre_of_mass"][:]
-    states = []
+    position, orientation = file["trajectory/position"], file["trajectory/orientation"]  # which remember chunks as long as they are open
     for row in [kept.index(frame) for frame in wanted or kept[-1:]]:
-        w_last = np.roll(file["trajectory/orientation"][row], -1, axis=1)
+        w_last = np.roll(orientation[row], -1, axis=1)
         rotation = Rotation.from_quat(w_last).as_matrix()
         moved = np.einsum("nij,nj->ni", rotation, centre)
-        states.append(Bodies(shapes, asset, fixed, rotation, file["trajectory/position"][row] - moved))
-    return states
+        yield Bodies(shapes, asset, fixed, rotation, position[row] - moved)
 
 
-def read_scene(path, file, level):
-    shapes, asset = read_shapes(path, file, "instances", level)
+def read_scene(path, file):
+    shapes, asset = read_shapes(path, file, "instances")
     if "simulation/motion" in file:
         fixed = file["simulation/motion"][:] == 1
     else:
@@ -107,17 +120,18 @@ def read_scene(path, file, level):
     bodies = Bodies(shapes, asset, fixed, file["instances/rotation"][:], file["instances/translation"][:])
     if "simulation/motion" not in file:
         bodies.fixed = ~bodies.subject
-    return [bodies]
+    return bodies
 
 
-def read(path, wanted, level=None):
-    """What stands where, for each of the frames that are wanted. level: of detail, of all bodies; None: the one that each has."""
-    with h5py.File(path) as file:
+def read(path, wanted=()):
+    """What stands where, for each of the frames that are wanted, one at a time: a large run does not fit into memory."""
+    with h5py.File(path, rdcc_nbytes=1 << 26, rdcc_nslots=20011) as file:  # chunks of a thinned run hold many states
         if "trajectory" in file or "bodies" in file:
-            return read_run(path, file, wanted, level)
-        if wanted:
+            yield from read_run(path, file, wanted)
+        elif wanted:
             raise ValueError("is a scene, which has no frames")
-        return read_scene(path, file, level)
+        else:
+            yield read_scene(path, file)
 
 
 def read_contacts(path, bodies):

@@ -121,7 +121,7 @@ class LinksTest(unittest.TestCase):
     def test_excerpts_are_those_of_their_programs(self):
         for page, start, program in (("docs/gpu.md", "for (int step = 0", "tests/gpu/example_contacts.cu"),
                                      ("docs/contacts.md", "manifolds.rows()", "tests/consumer/game_loop.cpp"),
-                                     ("docs/c.md", "tandem_gpu_broad_phase_find(", "tests/c/gpu_contacts.c")):
+                                     ("docs/c_gpu.md", "tandem_gpu_broad_phase_find(", "tests/c/gpu_contacts.c")):
             shown = [block for block in re.findall(r"^```c(?:pp)?\n(.*?)^```$", (ROOT / page).read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL) if start in block]
             self.assertEqual(len(shown), 1, page)
             lines = "\n".join(line.strip() for line in (ROOT / program).read_text(encoding="utf-8").splitlines())

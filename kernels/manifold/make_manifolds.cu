@@ -25,51 +25,6 @@ using LargeTeam = BlockTeam<kThreads>;
 using FindingTeam = BlockTeam<kFinders, true>;
 using PatchTeam = BlockTeam<kThreads, true>;
 
-/// Memory that teams share, without contents at first.
-template <typename T>
-struct Raw {
-  alignas(16) unsigned char bytes[sizeof(T)];
-  __device__ T& get() { return *reinterpret_cast<T*>(bytes); }
-};
-
-/// Calls of(row) for rows below `rows` that no other team has taken.
-template <typename AnyTeam, typename Of>
-__device__ void take_rows(const AnyTeam& team, std::uint32_t rows, std::uint32_t& next, std::uint32_t& taken,
-                          const Of& of) {
-  for (;;) {
-    if (team.rank() == 0) team.store(taken, atomicAdd(&next, 1u));
-    team.sync();
-    const std::uint32_t row = team.load(taken);
-    if (row >= rows) return;
-    of(row);
-    team.sync();
-  }
-}
-
-/// Calls of(team, row, 0) for rows below `many`, by blocks, then of(team, row, warp) for rows below `few`, by
-/// warps.
-template <std::uint32_t kSize, typename Of>
-__device__ void share_out(std::uint32_t many, std::uint32_t& next_many, std::uint32_t few,
-                          std::uint32_t& next_few, const Of& of) {
-  __shared__ BlockScratch<kSize> scratch;
-  __shared__ std::uint32_t taken[kSize / 32];
-  for (bool by_block = true;;) {
-    const std::uint32_t own = by_block ? 0 : threadIdx.x / 32;
-    const BlockTeam<kSize, true> team(by_block ? &scratch : nullptr, nullptr);
-    if (team.rank() == 0) team.store(taken[own], atomicAdd(by_block ? &next_many : &next_few, 1u));
-    team.sync();
-    const std::uint32_t row = team.load(taken[own]);
-    if (row < (by_block ? many : few)) {
-      of(team, row, own);
-    } else if (!by_block) {
-      return;
-    } else {
-      by_block = false;
-    }
-    team.sync();
-  }
-}
-
 // Pieces of a curve that a warp takes on. Where there are enough curves for all warps of a GPU, warps do more
 // of them at a time; else blocks are sooner done.
 __device__ std::uint32_t most_of_warp(const GpuGroupCounts& counts) {
@@ -432,12 +387,14 @@ __global__ void __launch_bounds__(kThreads, 3) measure_depths(const __grid_const
     if (begun.is_deep != is_deep || (!is_deep && begun.state.kind != manifold::PatchKind::overlap) ||
         direction >= search.directions)
       return;
-    with_maker(args, team, memory[own], begun.of, [&](auto& maker, PatchState&) {
+    with_maker(args, team, memory[own], begun.of, [&](auto& maker, PatchState& state) {
       const manifold::OverlapLine line = maker.line_along(search, direction, searches[own].get());
-      const bool through = !is_deep && begun.state.bent && line.found() &&
-                           maker.goes_through(line, search, searches[own].get().lines);
+      if (!is_deep) {
+        copy_state(team, begun.state, state);
+        maker.end_overlap(line, searches[own].get().lines);
+        return copy_state(team, state, begun.state);
+      }
       if (team.rank() != 0) return;
-      if (!is_deep) return maker.take_deepest(line, through, memory[own].bodies.get(), begun.state);
       deep_lines(begun).along[direction] = line;
       // Numbers above 0 are in the order of their bits.
       atomicMin(reinterpret_cast<Counter*>(&search.enough),

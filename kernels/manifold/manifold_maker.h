@@ -1,5 +1,6 @@
 #pragma once
 #include "kernels/manifold/patch_normal.h"
+#include "kernels/manifold/patch_ridges.h"
 #include "kernels/manifold/patch_rim.h"
 #include "kernels/manifold/patch_sheets.h"
 
@@ -19,9 +20,6 @@ inline constexpr double kNearDeepest = 0.03;
 /// A point of the rim is as deep as the deepest line if it is less deep by no more than this part; it may be
 /// deeper by kDeepEnough.
 inline constexpr double kAsDeep = 1e-6;
-
-/// A point is outside a triangle if its share of a corner is further below 0 than this.
-inline constexpr double kOutside = 1e-12;
 
 /// A rim of so few candidates is measured from two points.
 inline constexpr std::uint32_t kFewCandidates = 32;
@@ -53,13 +51,8 @@ class ManifoldMaker {
   /// Finds how deep the overlap is along a direction at least.
   TANDEM_HD double least_depth_along(const DepthSearch& search, int direction, SearchMemory& shared) const;
 
-  /// Returns whether a line along the first direction leaves the overlap on its way.
-  TANDEM_HD bool goes_through(const OverlapLine& line, const DepthSearch& search, LineMemory& lines) const;
-
-  /// Takes the deepest line of a patch that is not deep; through: of a bent one, it leaves the overlap on its
-  /// way. It is called by one of the team.
-  TANDEM_HD static void take_deepest(const OverlapLine& line, bool through, const BodyPair& bodies,
-                                     PatchState& state);
+  /// Takes the deepest line of a patch that is not deep, and finds its ridges.
+  TANDEM_HD void end_overlap(const OverlapLine& line, LineMemory& lines);
 
   /// Finds the direction in which the overlap of a deep patch is shallowest, the rim and depths. If the
   /// bodies do not overlap along any direction, the patch is a touch where its area says how it pushes, and
@@ -83,7 +76,7 @@ class ManifoldMaker {
   TANDEM_HD std::uint32_t ask_at_rim(LineMemory& lines) const;
   TANDEM_HD void take_rim(const LineMemory& lines);
   TANDEM_HD bool goes_through(const OverlapLine& line, const PatchFrame& frame, LineMemory& lines) const;
-  TANDEM_HD Vector2 reach_to_rim(const Sounding& s, double (&height)[2]) const;
+  TANDEM_HD void take_deepest(const OverlapLine& line, bool through);
   TANDEM_HD void place_candidates(const RimFinder<Team>& finder, ChoiceMemory& shared) const;
   TANDEM_HD void place_sheets(ChoiceMemory& shared) const;
   TANDEM_HD void keep_apart(int most_of_rim, ChoiceMemory& shared) const;
@@ -148,6 +141,7 @@ TANDEM_HD void ManifoldMaker<Team>::take_normal(const CurveMeasure& measure, con
     state_.closed = measure.closed || (touch && measure.point);
     state_.goes_through = state_.bent = state_.through = false;
     state_.deepest = {};
+    for (OverlapLine& ridge : state_.ridge) ridge = {};
     state_.rim_points = 0;
     state_.area = measure.area;
     state_.centre = measure.middle;
@@ -267,11 +261,8 @@ TANDEM_HD_CALLED void ManifoldMaker<Team>::end_deep(std::uint32_t region, const 
   take_rim(lines);
   SheetFinder<Team>(team_, bodies_, memory_, summary_, state_).find(search.seeds, lines);
   const bool through = deepest.found() && goes_through(deepest, state_.frame, lines);
-  if (team_.rank() == 0) {
-    state_.goes_through = through;
-    take_deepest(deepest, through, bodies_, state_);
-  }
-  team_.sync();
+  if (team_.rank() == 0) state_.goes_through = through;
+  take_deepest(deepest, through);
 }
 
 template <typename Team>
@@ -280,11 +271,7 @@ TANDEM_HD void ManifoldMaker<Team>::measure(std::uint32_t region, DepthSearch& s
   outline(region, shared, search);
   if (state_.kind != PatchKind::overlap && state_.kind != PatchKind::deep) return;
   sound(search, depths);
-  if (state_.kind == PatchKind::overlap) {
-    const OverlapLine line = line_along(search, 0, depths);
-    const bool through = state_.bent && line.found() && goes_through(line, search, depths.lines);
-    return take_deepest(line, through, bodies_, state_);
-  }
+  if (state_.kind == PatchKind::overlap) return end_overlap(line_along(search, 0, depths), depths.lines);
   DeepLines found;
   // The directions along which the first lines are shallowest come first; of others little more is looked at.
   double known[2 * kMostTried];
@@ -326,12 +313,10 @@ TANDEM_HD void ManifoldMaker<Team>::take_rim(const LineMemory& lines) {
 }
 
 template <typename Team>
-TANDEM_HD bool ManifoldMaker<Team>::goes_through(const OverlapLine& line, const DepthSearch& search,
-                                                 LineMemory& lines) const {
-  team_.sync();
-  if (team_.rank() == 0) lines.frame[0] = PatchFrame(summary_.origin, search.along(0));
-  team_.sync();
-  return goes_through(line, lines.frame[0], lines);
+TANDEM_HD void ManifoldMaker<Team>::end_overlap(const OverlapLine& line, LineMemory& lines) {
+  team_.sync();  // all are done with the lines of the search
+  take_deepest(line, state_.bent && line.found() && goes_through(line, state_.frame, lines));
+  RidgeFinder<Team>(team_, bodies_, state_).find(lines);
 }
 
 /// Returns whether one body ends within the other on a line. frame: what all of the team see.
@@ -355,43 +340,18 @@ TANDEM_HD bool ManifoldMaker<Team>::goes_through(const OverlapLine& line, const 
   return goes;
 }
 
-/// What is no deeper than rounding is a touch.
+/// What is no deeper than rounding is a touch. through: of a bent patch, the line leaves the overlap on its
+/// way.
 template <typename Team>
-TANDEM_HD void ManifoldMaker<Team>::take_deepest(const OverlapLine& line, bool through,
-                                                 const BodyPair& bodies, PatchState& state) {
-  if (line.found() && line.depth() > kNoArea * bodies.reach())
-    state.deepest = line, state.through = through;
-  else
-    state.kind = PatchKind::touch, state.goes_through = false;
-  state.bent = state.bent && state.deepest.found();
-}
-
-/// Returns the place nearest to the point of the rim, on the way to the sounding's line, to which the
-/// triangles of both bodies reach that the line met, and their heights there.
-template <typename Team>
-TANDEM_HD Vector2 ManifoldMaker<Team>::reach_to_rim(const Sounding& s, double (&height)[2]) const {
-  double share[2][3], change[2][3], of[2][3], part = 0;
-  for (int side = 0; side < 2; ++side) {
-    Vector2 at[3], from_line[3];
-    for (int k = 0; k < 3; ++k) {
-      const Vector3 x = bodies_[side].corner(s.surface[side].triangle, k);
-      at[k] = state_.frame.flat(x) - s.at, of[side][k] = state_.frame.height(x);
-      from_line[k] = at[k] + s.at - s.line;
-    }
-    const double area = cross(at[1] - at[0], at[2] - at[0]);
-    for (int k = 0; k < 3; ++k) {
-      const int p = (k + 1) % 3, q = (k + 2) % 3;
-      share[side][k] = cross(at[p], at[q]) / area;
-      change[side][k] = cross(from_line[p], from_line[q]) / area - share[side][k];
-      if (share[side][k] < -kOutside && change[side][k] > 0)
-        part = greater(lesser(-share[side][k] / change[side][k], 1.0), part);
-    }
+TANDEM_HD void ManifoldMaker<Team>::take_deepest(const OverlapLine& line, bool through) {
+  if (team_.rank() == 0) {
+    if (line.found() && line.depth() > kNoArea * bodies_.reach())
+      state_.deepest = line, state_.through = through;
+    else
+      state_.kind = PatchKind::touch, state_.goes_through = false;
+    state_.bent = state_.bent && state_.deepest.found();
   }
-  for (int side = 0; side < 2; ++side) {
-    height[side] = 0;
-    for (int k = 0; k < 3; ++k) height[side] += (share[side][k] + part * change[side][k]) * of[side][k];
-  }
-  return s.at + part * (s.line - s.at);
+  team_.sync();
 }
 
 /// What may become points: those of the rim, and the one of the deepest line. A point lies on the line along
@@ -401,14 +361,16 @@ TANDEM_HD void ManifoldMaker<Team>::place_candidates(const RimFinder<Team>& find
                                                      ChoiceMemory& shared) const {
   const int rank = static_cast<int>(team_.rank()), size = static_cast<int>(team_.size());
   const double deepest = state_.deepest.depth();
-  for (int i = rank; i <= state_.rim_points; i += size) {
+  for (int i = rank; i <= 2 * state_.rim_points; i += size) {
     Chosen& c = shared.candidate[i];
-    if (i == state_.rim_points) {
-      const OverlapLine& line = state_.deepest;
+    if (i >= state_.rim_points) {
+      const int next = i - state_.rim_points;  // 0 is the deepest line
+      const OverlapLine& line = next == 0 ? state_.deepest : state_.ridge[next - 1];
+      if (!line.found()) continue;
       c.at = line.at, c.depth = line.depth(), c.height = (line.height[0] + line.height[1]) / 2;
       c.triangle[0] = line.triangle[0], c.triangle[1] = line.triangle[1];
-      c.feature = feature_hash(0, 4);
-      c.deepest = true;
+      c.feature = next == 0 ? feature_hash(0, 4) : feature_hash(state_.sounding[next - 1].feature, 6);
+      c.deepest = next == 0;
     } else {
       const Sounding& s = state_.sounding[i];
       const Piece& piece = finder.piece(s.reference);
@@ -419,7 +381,7 @@ TANDEM_HD void ManifoldMaker<Team>::place_candidates(const RimFinder<Team>& find
       // Other surfaces than those of the patch may be nearer to the rim; none of the patch is deeper.
       if (s.overlap() > 0 && s.overlap() <= deepest * (1 + kDeepEnough)) {
         double height[2];
-        const Vector2 at = reach_to_rim(s, height);
+        const Vector2 at = reach_to_rim(bodies_, state_.frame, s, height);
         if (height[0] - height[1] > kNoArea * bodies_.reach()) {
           c.at = at;
           c.depth = height[0] - height[1], c.height = (height[0] + height[1]) / 2;
@@ -492,6 +454,9 @@ TANDEM_HD void ManifoldMaker<Team>::keep_apart(int most_of_rim, ChoiceMemory& sh
       insert(i);
     }
     if (has_deepest) insert(state_.rim_points);
+    for (int i = 0; i < state_.rim_points; ++i) {
+      if (state_.ridge[i].found()) insert(state_.rim_points + 1 + i);
+    }
   }
   const double near = kNear * bodies_.smaller_diagonal(),
                near_deepest = greater(near, kNearDeepest * state_.reach);

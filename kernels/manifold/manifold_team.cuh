@@ -448,4 +448,49 @@ struct BlockTeam : TeamOfWarps {
   }
 };
 
+/// Memory that teams share, without contents at first.
+template <typename T>
+struct Raw {
+  alignas(16) unsigned char bytes[sizeof(T)];
+  __device__ T& get() { return *reinterpret_cast<T*>(bytes); }
+};
+
+/// Calls of(row) for rows below `rows` that no other team has taken.
+template <typename AnyTeam, typename Of>
+__device__ void take_rows(const AnyTeam& team, std::uint32_t rows, std::uint32_t& next, std::uint32_t& taken,
+                          const Of& of) {
+  for (;;) {
+    if (team.rank() == 0) team.store(taken, atomicAdd(&next, 1u));
+    team.sync();
+    const std::uint32_t row = team.load(taken);
+    if (row >= rows) return;
+    of(row);
+    team.sync();
+  }
+}
+
+/// Calls of(team, row, 0) for rows below `many`, by blocks, then of(team, row, warp) for rows below `few`, by
+/// warps.
+template <std::uint32_t kSize, typename Of>
+__device__ void share_out(std::uint32_t many, std::uint32_t& next_many, std::uint32_t few,
+                          std::uint32_t& next_few, const Of& of) {
+  __shared__ BlockScratch<kSize> scratch;
+  __shared__ std::uint32_t taken[kSize / 32];
+  for (bool by_block = true;;) {
+    const std::uint32_t own = by_block ? 0 : threadIdx.x / 32;
+    const BlockTeam<kSize, true> team(by_block ? &scratch : nullptr, nullptr);
+    if (team.rank() == 0) team.store(taken[own], atomicAdd(by_block ? &next_many : &next_few, 1u));
+    team.sync();
+    const std::uint32_t row = team.load(taken[own]);
+    if (row < (by_block ? many : few)) {
+      of(team, row, own);
+    } else if (!by_block) {
+      return;
+    } else {
+      by_block = false;
+    }
+    team.sync();
+  }
+}
+
 }  // namespace tandem::gpu

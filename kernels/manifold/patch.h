@@ -229,8 +229,9 @@ static_assert(2 * kMostSheets <= LineMemory::kMost);
 /// The state of a patch from one step to the next.
 struct PatchState {
   Sounding sounding[kMostRimPoints];
-  Sheet sheet[kMostSheets];  ///< of a bent patch
-  OverlapLine deepest;       ///< none where the patch has no depth
+  OverlapLine ridge[kMostRimPoints - 1];  ///< between a point of the rim and the next, where it is deep
+  Sheet sheet[kMostSheets];               ///< of a bent patch
+  OverlapLine deepest;                    ///< none where the patch has no depth
   int rim_points, sheets;
   PatchKind kind;
   bool closed, goes_through;
@@ -282,7 +283,8 @@ struct OutlineMemory {
 };
 
 /// The most points of which a manifold's are chosen.
-inline constexpr int kMostCandidates = kMostRimPoints + 1 + kMostSeeds;
+inline constexpr int kMostCandidates = 2 * kMostRimPoints;
+static_assert(kMostCandidates >= kMostRimPoints + 1 + kMostSeeds);
 
 /// The memory that a team shares while it chooses a patch's points.
 struct ChoiceMemory {

@@ -296,4 +296,33 @@ TANDEM_HD void RimFinder<Team>::name_points(Chosen* points, int count, double di
   team_.sync();
 }
 
+/// Returns the place nearest to the point of the rim, on the way to the sounding's line, to which the
+/// triangles of both bodies reach that the line met, and their heights there.
+TANDEM_HD inline Vector2 reach_to_rim(const BodyPair& bodies, const PatchFrame& frame, const Sounding& s,
+                                      double (&height)[2]) {
+  constexpr double kOutside = 1e-12;  // a point is outside if its share of a corner is further below 0
+  double share[2][3], change[2][3], of[2][3], part = 0;
+  for (int side = 0; side < 2; ++side) {
+    Vector2 at[3], from_line[3];
+    for (int k = 0; k < 3; ++k) {
+      const Vector3 x = bodies[side].corner(s.surface[side].triangle, k);
+      at[k] = frame.flat(x) - s.at, of[side][k] = frame.height(x);
+      from_line[k] = at[k] + s.at - s.line;
+    }
+    const double area = cross(at[1] - at[0], at[2] - at[0]);
+    for (int k = 0; k < 3; ++k) {
+      const int p = (k + 1) % 3, q = (k + 2) % 3;
+      share[side][k] = cross(at[p], at[q]) / area;
+      change[side][k] = cross(from_line[p], from_line[q]) / area - share[side][k];
+      if (share[side][k] < -kOutside && change[side][k] > 0)
+        part = greater(lesser(-share[side][k] / change[side][k], 1.0), part);
+    }
+  }
+  for (int side = 0; side < 2; ++side) {
+    height[side] = 0;
+    for (int k = 0; k < 3; ++k) height[side] += (share[side][k] + part * change[side][k]) * of[side][k];
+  }
+  return s.at + part * (s.line - s.at);
+}
+
 }  // namespace tandem::manifold

@@ -1,4 +1,4 @@
-# The program for a GPU that docs/c.md names finds the contacts of two cubes, or says that there is no GPU. Variables: SOURCE, FOLDER (to work in),
+# The program for a GPU that docs/c_gpu.md names finds the contacts of two cubes, or says that there is no GPU. Variables: SOURCE, FOLDER (to work in),
 # BVHBUILD, EXAMPLE.
 
 file(MAKE_DIRECTORY ${FOLDER})

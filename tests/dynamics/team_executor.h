@@ -1,13 +1,38 @@
 #pragma once
 #include <algorithm>
-#include <barrier>
+#include <condition_variable>
 #include <cstdint>
+#include <mutex>
 #include <thread>
 #include <vector>
 
 #include "dynamics/parallel/host_executor.h"
 
 namespace tandem::dynamics {
+
+/// Threads wait here for each other, again and again. std::barrier of libstdc++ 12 for Windows does so for
+/// ever, now and then: its threads sleep by a wait for a number, and miss that it changed.
+class Meeting {
+ public:
+  explicit Meeting(std::uint32_t threads) : threads_(threads) {}
+
+  void come_and_wait() {
+    std::unique_lock lock(mutex_);
+    const std::uint64_t own = held_;
+    if (++here_ == threads_) {
+      here_ = 0, ++held_;
+      all_came_.notify_all();
+    } else {
+      all_came_.wait(lock, [&] { return held_ != own; });
+    }
+  }
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable all_came_;
+  std::uint32_t threads_, here_ = 0;
+  std::uint64_t held_ = 0;  // meetings
+};
 
 /// Several threads of the CPU as a team, see SerialTeam. It sums up as a block of 128 threads of a GPU does,
 /// whatever the number of threads.
@@ -18,8 +43,8 @@ class ThreadTeam {
 
   /// What the threads share.
   struct Shared {
-    explicit Shared(std::uint32_t threads) : barrier(threads) {}
-    std::barrier<> barrier;
+    explicit Shared(std::uint32_t threads) : meeting(threads) {}
+    Meeting meeting;
     double of_lane[3][kLanes];
   };
 
@@ -28,7 +53,7 @@ class ThreadTeam {
 
   std::uint32_t rank() const { return rank_; }
   std::uint32_t size() const { return size_; }
-  void barrier() const { shared_.barrier.arrive_and_wait(); }
+  void barrier() const { shared_.meeting.come_and_wait(); }
   template <typename Visit>
   void each(std::uint32_t count, const Visit& visit) const {
     for (std::uint32_t i = rank_; i < count; i += size_) visit(i);

@@ -611,8 +611,8 @@ def test_the_page_shows_what_runs(assets, tmp_path, monkeypatch):
     pytest.importorskip("torch")
     assets[1].save(tmp_path / "cow.bvh")
     monkeypatch.chdir(tmp_path)
-    blocks = re.findall(r"^```pycon\n(.*?)^```$", (ROOT / "docs/python.md").read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
-    test = doctest.DocTestParser().get_doctest("\n".join(blocks), {}, "docs/python.md", None, 0)
+    blocks = re.findall(r"^```pycon\n(.*?)^```$", (ROOT / "docs/python_gpu.md").read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
+    test = doctest.DocTestParser().get_doctest("\n".join(blocks), {}, "docs/python_gpu.md", None, 0)
     failed, tried = doctest.DocTestRunner().run(test, clear_globs=False)
     assert failed == 0 and tried > 10
     assert len(test.globs["faces"]) > 0 and test.globs["contacts"] > 0

@@ -1,4 +1,4 @@
-"""What the tests of tandem.view() know of pictures. The project's own z-buffer (scripts/render.py) says what ought to be there. Skips the test where nothing draws."""
+"""What the tests of tandem.view() know of pictures. A z-buffer (tests/common/z_buffer.py) says what ought to be there. Skips the test where nothing draws."""
 import colorsys
 import os
 import pathlib
@@ -9,16 +9,16 @@ import numpy as np
 import pytest
 
 SOURCE_DIR = pathlib.Path(os.environ["TANDEM_SOURCE_DIR"])
-sys.path.append(os.fspath(SOURCE_DIR / "scripts"))
+sys.path.append(os.fspath(SOURCE_DIR / "tests/common"))
 
 pytest.importorskip("pyvista")
 h5py = pytest.importorskip("h5py")
-render = pytest.importorskip("render", reason="scripts/render.py needs matplotlib")
 DRAWS = "import pyvista; plotter = pyvista.Plotter(off_screen=True); plotter.add_mesh(pyvista.Sphere()); plotter.screenshot()"
 if subprocess.run([sys.executable, "-c", DRAWS], capture_output=True).returncode:
     pytest.skip("VTK cannot draw off screen here: it needs EGL or OSMesa (libegl1 libgl1-mesa-dri)", allow_module_level=True)
 
 import tandem  # noqa: E402
+import z_buffer  # noqa: E402
 from meshes import BOX_FACES, BOX_VERTICES  # noqa: E402
 
 SIZE = (320, 200)
@@ -47,7 +47,7 @@ def body_of_pixels(view, assets, instances):
     """What a z-buffer says each pixel shows: a row of instances, or -1."""
     posed = [assets[row["asset"]].triangles() @ row["rotation"].T + row["translation"] for row in instances]
     body = np.repeat(np.arange(len(posed)), [len(triangles) for triangles in posed])
-    nearest = render.rasterise(projected(view, np.concatenate(posed)), SIZE)[1]
+    nearest = z_buffer.rasterise(projected(view, np.concatenate(posed)), SIZE)[1]
     return np.where(nearest < 0, -1, body[nearest])
 
 

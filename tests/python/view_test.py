@@ -10,12 +10,13 @@ import numpy as np
 import pytest
 
 # Where nothing draws, this skips all that follows.
-from pictures import RED, SIZE, SOURCE_DIR, TURNED, body_of_pixels, box, command, grown, h5py, hue_distance, hues, inner, is_backdrop, projected, render, write_run
+from pictures import RED, SIZE, SOURCE_DIR, TURNED, body_of_pixels, box, command, grown, h5py, hue_distance, hues, inner, is_backdrop, projected, write_run
 
 import matplotlib
 import matplotlib.image
 
 import tandem
+import z_buffer
 from meshes import BOX_VERTICES, read_obj
 from tandem import scene_files, tree, viewer
 
@@ -133,7 +134,7 @@ def test_triangles_that_meet_are_red_and_no_others(shown, box):
         touched = np.unique(np.concatenate([np.stack([found.pairs[found.contacts["pair"]][s], found.contacts[f"triangle_{s}"]], 1)
                                             for s in "ab"]), axis=0)
         posed = np.array([box.triangles()[t] + instances["translation"][b] for b, t in touched])
-        expected = render.rasterise(projected(view, posed), SIZE)[1] >= 0
+        expected = z_buffer.rasterise(projected(view, posed), SIZE)[1] >= 0
         assert expected.sum() > 200 and not (expected & inner(expected) & ~red).any() and not (red & ~grown(expected)).any()
 
 

@@ -1,4 +1,4 @@
-"""Scenes, and the states that runs of bvhbench simulate keep (docs/scenes.md, docs/simulation.md).
+"""Scenes, and the states that runs of bvhbench simulate keep (docs/scenes.md, docs/run_file.md).
 
 Reading needs h5py.
 """

@@ -5,7 +5,7 @@
 #include "common/random_pose.h"
 
 /// Generators of posed snapshots. The same arguments give the same poses on every platform: random numbers
-/// are SplitMix64's, and arithmetic is float64 with +, -, *, / and square roots alone. docs/scenes.md
+/// are SplitMix64's, and arithmetic is float64 with +, -, *, / and square roots alone. docs/scene_kinds.md
 /// describes the scenes.
 namespace tandem::bench {
 

@@ -21,7 +21,7 @@ struct Trajectory {
   void keep(std::uint32_t step, std::span<const BodyState> states);
 };
 
-/// The results of a run so far; docs/simulation.md describes the file.
+/// The results of a run so far; docs/run_file.md describes the file.
 struct RunResults {
   std::vector<StepRecord> records;
   Trajectory trajectory;

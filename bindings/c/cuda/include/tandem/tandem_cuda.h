@@ -1,5 +1,5 @@
 /// Tandem's C interface to queries and worlds on a GPU: libtandem_cuda.so, beside libtandem.so, whose assets
-/// it takes. C99 and C++; needs no header of CUDA's. docs/c.md is its page; what calls mean is in
+/// it takes. C99 and C++; needs no header of CUDA's. docs/c_gpu.md is its page; what calls mean is in
 /// docs/gpu.md.
 ///
 /// The conventions are those of tandem.h, and these:

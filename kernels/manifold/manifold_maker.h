@@ -3,6 +3,7 @@
 #include "kernels/manifold/patch_ridges.h"
 #include "kernels/manifold/patch_rim.h"
 #include "kernels/manifold/patch_sheets.h"
+#include "kernels/manifold/seed_finder.h"
 
 /// The rule by which contacts become manifolds (docs/manifold_method.md), for CPU and GPU alike.
 namespace tandem::manifold {
@@ -199,14 +200,15 @@ TANDEM_HD void ManifoldMaker<Team>::outline(std::uint32_t region, OutlineMemory&
   team_.sync();
   if (state_.kind != PatchKind::overlap && !is_deep) return;
   const int wanted = is_deep || state_.candidates > kFewCandidates ? kMostSeeds : kMostSeeds / 2;
-  DeepestLine<Team>::find_places(team_, memory_, region, search.middle, search.reach, wanted, search.seeds);
+  SeedFinder<Team>(team_, bodies_, memory_, summary_)
+      .find_places(region, search.middle, search.reach, wanted, search.seeds);
 }
 
 template <typename Team>
 TANDEM_HD void ManifoldMaker<Team>::sound(DepthSearch& search, SearchMemory& shared) {
   const bool has_rim = state_.kind == PatchKind::overlap;
-  DeepestLine<Team>(team_, bodies_, memory_, summary_, shared)
-      .go_inside(search.seeds, search.middle, has_rim ? ask_at_rim(shared.lines) : 0);
+  SeedFinder<Team>(team_, bodies_, memory_, summary_)
+      .go_inside(search.seeds, search.middle, has_rim ? ask_at_rim(shared.lines) : 0, shared.lines);
   if (!has_rim) return;
   take_rim(shared.lines);
   SheetFinder<Team>(team_, bodies_, memory_, summary_, state_).find(search.seeds, shared.lines);

@@ -85,6 +85,10 @@ class CurvePlaces {
 /// inside are tilted by this much if corners or edges lie in faces.
 inline constexpr double kTilt = 0.125;
 
+/// Where lines that go inside begin: at pieces of the curve, behind their triangles; or at places within the
+/// curve, in the direction that pieces give, or the other way.
+enum class LineFrom : std::uint8_t { curve, within, within_and_back };
+
 /// Lines that a team follows at once, each in a frame of its own where that is needed.
 struct LineMemory {
   static constexpr int kMost = 20, kMostPlaces = 8;
@@ -107,10 +111,9 @@ class OverlapLines {
   /// Finds a point of the overlap beside each of the first places: half-way from there, behind both
   /// triangles, to where the overlap ends on that line, but no further than `most`. Result: a bit for each
   /// place; 0 where its triangles face each other, or the line is not within both bodies. The first
-  /// questions, `asked`, are others'; with them there are at most LineMemory::kMost. Pieces say in which
-  /// direction the lines go, or, if `between` is -1, whence they come; with 1 or -1 the places do not lie on
-  /// their pieces.
-  TANDEM_HD std::uint32_t go_inside(int count, double most, std::uint32_t asked = 0, int between = 0) const;
+  /// questions, `asked`, are others'; with them there are at most LineMemory::kMost.
+  TANDEM_HD std::uint32_t go_inside(int count, double most, std::uint32_t asked = 0,
+                                    LineFrom where = LineFrom::curve) const;
 
   /// Asks where a straight line within a, and one within b, from one point to two others meet the surface of
   /// the body, if they do so before they are there. The point is within both, perhaps hardly: a line that
@@ -172,7 +175,7 @@ TANDEM_HD std::uint32_t CurvePlaces<Team>::least_piece(std::uint32_t begin, std:
 
 template <typename Team>
 TANDEM_HD std::uint32_t OverlapLines<Team>::go_inside(int count, double most, std::uint32_t asked,
-                                                      int between) const {
+                                                      LineFrom where) const {
   LineQuestions questions(bodies_, shared_.line);
   team_.sync();
   for (int i = static_cast<int>(team_.rank()); i < count; i += static_cast<int>(team_.size())) {
@@ -191,13 +194,13 @@ TANDEM_HD std::uint32_t OverlapLines<Team>::go_inside(int count, double most, st
       continue;
     }
     Vector3 from = place.at;
-    if (between == 0 && of.kind() == MeetingKind::polygon) {
+    if (where == LineFrom::curve && of.kind() == MeetingKind::polygon) {
       Meeting meeting;
       meet_again(bodies_, of, meeting);
       from = {};
       for (int k = 0; k < meeting.corners; ++k) from = from + (1.0 / meeting.corners) * meeting.corner[k];
     }
-    frame = PatchFrame(from, (between < 0 ? -1.0 : 1.0) * normalized(along));
+    frame = PatchFrame(from, (where == LineFrom::within_and_back ? -1.0 : 1.0) * normalized(along));
     const double begin = behind(most);
     for (std::uint32_t side = 0; side < 2; ++side)
       questions.ask(line + side, frame, static_cast<int>(side), 0, {}, begin, begin, INFINITY, INFINITY,

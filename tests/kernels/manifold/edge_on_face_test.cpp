@@ -9,7 +9,8 @@ namespace {
 // A plate that leans on an edge of another one, and is turned a little along the edge: the two ends of the
 // edge are not equally deep, and each has a point.
 TEST(EdgeOnFace, BothEndsOfTheEdgeHaveAPointOfTheirDepth) {
-  constexpr double kLean = 8.4 * kDegree, kDepth = 2e-3, kThick = 0.02, kSide = 0.5;
+  constexpr double kLean = 8.4 * kDegree, kDepth = 2e-3;
+  constexpr float kThick = 0.02f, kSide = 0.5f;
   RandomPoses random(1);
   ManifoldScene scene;
   const std::uint32_t plate = scene.add_shape(box(kSide, kSide, kThick));

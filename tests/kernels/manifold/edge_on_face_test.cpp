@@ -28,7 +28,7 @@ TEST(EdgeOnFace, BothEndsOfTheEdgeHaveAPointOfTheirDepth) {
     ASSERT_EQ(scene.manifolds().size(), 1u);
     EXPECT_LT(angle_between(vector_of(scene.manifolds()[0].normal), rotate(motion, Vector3{} - down)),
               0.1 * kDegree);
-    for (const double end : {at.x - kSide / 2, kSide / 2}) {
+    for (const double end : {at.x - kSide / 2, 0.5 * kSide}) {
       const Vector3 place = apply(motion, {end, 0, 0});
       const double depth = kDepth + dot(down, Vector3{-end, 0, 0});
       double nearest = 0.02;

@@ -83,7 +83,7 @@ struct Spread {
 inline constexpr double kShallower = 1e-9;
 
 /// The most directions that are tried for a normal.
-inline constexpr int kMostTried = 11;
+inline constexpr int kMostTried = 13;
 
 /// The direction of a face, from a towards b.
 struct Direction {

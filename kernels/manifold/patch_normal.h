@@ -62,7 +62,7 @@ class NormalFinder {
  private:
   static constexpr int kMost = kMostTried;
   static constexpr float kApart = 4.1f * kSameFace;
-  static_assert(kMost == 2 * kMostDirections + 1);
+  static_assert(kMost == 2 * kMostDirections + 3);
 
   template <typename Visit>
   TANDEM_HD void for_each_piece(const Visit& visit) const {
@@ -81,6 +81,7 @@ class NormalFinder {
   TANDEM_HD bool gather_directions(int side, bool keep_if_many);
   TANDEM_HD_CALLED Vector3 longest_line(const Vector3& middle, double reach) const;
   TANDEM_HD_CALLED void gather_unlike(int side, const Vector3& line, const Vector3& push);
+  TANDEM_HD_CALLED Vector3 way_out(int side, const Vector3& line, const Vector3& push);
   TANDEM_HD void find_faces_along(const Vector3& smooth, std::uint32_t (&holder)[2]) const;
   TANDEM_HD void sum_lengths_on_faces(const FloatVector (&face)[2], const std::uint32_t (&holder)[2],
                                       ExactSum (&within)[2]) const;
@@ -527,6 +528,21 @@ TANDEM_HD_CALLED void NormalFinder<Team>::gather_unlike(int side, const Vector3&
   team_.sync();
 }
 
+/// Returns the direction that leads away from all faces of one body that do not oppose the push: out of a
+/// corner, no face alone is the shortest way. 0 if there is none. No directions are gathered afterwards.
+template <typename Team>
+TANDEM_HD_CALLED Vector3 NormalFinder<Team>::way_out(int side, const Vector3& line, const Vector3& push) {
+  gather_unlike(side, line, {});
+  Vector3 sum;
+  for (int i = 0; i < directions_; ++i) {
+    const Vector3 n = shared_.direction[i].n;
+    if (dot(n, push) > -kLeastAlong) sum = sum + n;
+  }
+  team_.sync();  // all have read them
+  directions_ = 0;
+  return norm(sum) > kLeastAlong ? normalized(sum) : Vector3{};
+}
+
 template <typename Team>
 TANDEM_HD_CALLED int NormalFinder<Team>::gather_for_deep(const CurveMeasure& curve, double reach) {
   directions_ = 0;
@@ -535,6 +551,8 @@ TANDEM_HD_CALLED int NormalFinder<Team>::gather_for_deep(const CurveMeasure& cur
   const bool joined = memory_.pieces[memory_.order[begin_]].joined != 0;
   const bool both_ways = joined || summary_.degenerate || !counts || !curve.by_area || surrounds_hole_;
   const Vector3 line = longest_line(curve.middle, reach), push = both_ways ? Vector3{} : own;
+  Vector3 out_of_corner[2];
+  for (int side = 0; side < 2 && several_faces_; ++side) out_of_corner[side] = way_out(side, line, own);
   gather_unlike(0, line, push);
   gather_unlike(1, line, push);
   int count = 0;
@@ -547,6 +565,9 @@ TANDEM_HD_CALLED int NormalFinder<Team>::gather_for_deep(const CurveMeasure& cur
   if (team_.rank() == 0) {
     if (counts) add(own);
     for (int i = 0; i < directions_; ++i) add(shared_.direction[i].n);
+    for (const Vector3& way : out_of_corner) {
+      if (dot(way, way) > 0) add(way);
+    }
     shared_.count = count;
     shared_.both_ways = both_ways;
   }

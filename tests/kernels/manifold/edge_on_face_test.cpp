@@ -2,7 +2,7 @@
 
 #include "manifold_scene.h"
 
-/// Manifolds of bodies of which one has an edge along a face of the other.
+/// Manifolds of bodies of which one has an edge along a face of the other, or lies in a corner of it.
 namespace tandem::test {
 namespace {
 
@@ -38,6 +38,35 @@ TEST(EdgeOnFace, BothEndsOfTheEdgeHaveAPointOfTheirDepth) {
                       : nearest;
       EXPECT_LT(nearest, 0.01) << "end at " << end << ", turned by " << turned;
     }
+  }
+}
+
+// A box lies flat on the ground of a cup, and an edge of it cuts into the wall a little. Neither away from
+// the ground nor away from the wall does it come free soon, but between the two.
+TEST(BoxInCorner, IsPushedAwayFromBothFaces) {
+  constexpr int kSectors = 32;
+  constexpr float kSide = 0.25f, kWall = 0.1f;
+  constexpr double kDepth = 5e-3, kPi = 180 * kDegree;
+  RandomPoses random(2);
+  ManifoldScene scene;
+  scene.add_body(scene.add_shape(cup(kSectors, 1, 2, kWall)), kIdentityPose);
+  scene.add_body(scene.add_shape(box(kSide, kSide, kSide)), kIdentityPose);
+  for (int trial = 0; trial < trials(100, 20); ++trial) {
+    const double towards = (2 * static_cast<double>(random.below(kSectors)) + 1) * kPi / kSectors;
+    const double beside = random.symmetric(0.15), cuts = random.uniform(1e-5, 1e-3);
+    // The edge lies on the diagonal, half a turn's eighth from the sides.
+    const double to_edge = std::sqrt(0.5) * kSide * std::cos(beside);
+    const double from_axis = 0.9 * std::cos(kPi / kSectors) - to_edge + cuts;
+    scene.bodies[1].pose = after(
+        shift(from_axis * std::cos(towards), from_axis * std::sin(towards), kWall + 0.5 * kSide - kDepth),
+        turn(2, towards + kPi / 4 + beside));
+    const Pose motion = any_motion(random, 3);
+    scene.find(motion);
+    ASSERT_EQ(scene.manifolds().size(), 1u);
+    const Manifold& manifold = scene.manifolds()[0];
+    EXPECT_LT(manifold.depth, 2 * kDepth) << "cuts by " << cuts << ", turned by " << beside;
+    EXPECT_GT(manifold.depth, 0.99 * kDepth);
+    EXPECT_LT(angle_between(vector_of(manifold.normal), rotate(motion, {0, 0, 1})), 60 * kDegree);
   }
 }
 

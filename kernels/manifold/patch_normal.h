@@ -133,6 +133,7 @@ class NormalFinder {
   int directions_ = 0;
   bool surrounds_hole_ = false;  ///< the curve, and none is joined with it that surrounds it
   bool several_faces_ = false;   ///< face_nearest() had to choose between faces
+  double separation_ = 0;        ///< then, how far b must move until a plane lies between all triangles
   bool is_face_ = false;         ///< face_nearest() chose that of a face
 };
 
@@ -456,6 +457,7 @@ TANDEM_HD Vector3 NormalFinder<Team>::face_nearest(const Vector3& smooth, double
   for (int i = 1; i < count; ++i) {
     if (separation(i) < least) best = i, least = separation(i) * (1 - 1e-9);
   }
+  separation_ = separation(best);
   for (int i = 0; i < directions_; ++i)
     is_face_ = is_face_ || same_direction(shared_.tried[best], shared_.direction[i].n);
   return shared_.tried[best];
@@ -617,8 +619,12 @@ TANDEM_HD PatchNormal NormalFinder<Team>::find(const CurveMeasure& curve) {
   }
   out.kind = PatchKind::overlap;
   out.n = face_nearest(normalized(curve.by_area ? curve.area : curve.sheet_normal), curve.length);
-  // Triangles say along which face the overlap is removed the shortest way only where it is flat.
-  if (several_faces_ && height_along(out.n) > kNotFlat * reach_from(curve.middle)) out.kind = PatchKind::deep;
+  // Triangles say along which face the overlap is removed the shortest way only where it is flat, and they do
+  // not reach far beyond it, as those of a corner do.
+  if (several_faces_) {
+    const double reach = reach_from(curve.middle);
+    if (separation_ > 2 * reach || height_along(out.n) > kNotFlat * reach) out.kind = PatchKind::deep;
+  }
   // Where corners or edges lie in faces, rounding may leave out a part of the curve, and the area tells
   // little.
   if (summary_.degenerate && (!is_face_ || separation_along(out.n) > 2 * reach_from(curve.middle)))

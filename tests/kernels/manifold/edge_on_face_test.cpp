@@ -46,23 +46,23 @@ TEST(EdgeOnFace, BothEndsOfTheEdgeHaveAPointOfTheirDepth) {
 TEST(BoxInCorner, IsPushedAwayFromBothFaces) {
   constexpr int kSectors = 32;
   constexpr float kSide = 0.25f, kWall = 0.1f;
-  constexpr double kDepth = 5e-3, kPi = 180 * kDegree;
+  constexpr double kDepth = 5e-3, kHalfTurn = 180 * kDegree;
   RandomPoses random(2);
   ManifoldScene scene;
   scene.add_body(scene.add_shape(cup(kSectors, 1, 2, kWall)), kIdentityPose);
   scene.add_body(scene.add_shape(box(kSide, kSide, kSide)), kIdentityPose);
   for (int trial = 0; trial < trials(100, 20); ++trial) {
-    const double towards = (2 * static_cast<double>(random.below(kSectors)) + 1) * kPi / kSectors;
+    const double towards = (2 * static_cast<double>(random.below(kSectors)) + 1) * kHalfTurn / kSectors;
     const double beside = random.symmetric(0.15), cuts = random.uniform(1e-5, 1e-3);
     const double leans = trial % 2 == 0 ? 0 : random.uniform(0, 0.02);
     // The edge lies on the diagonal, half a turn's eighth from the sides.
     const double to_edge = std::sqrt(0.5) * kSide * std::cos(beside);
-    const double from_axis = 0.9 * std::cos(kPi / kSectors) - to_edge + cuts;
+    const double from_axis = 0.9 * std::cos(kHalfTurn / kSectors) - to_edge + cuts;
     // It leans away from the wall about its lower end.
     const Pose leaning =
         after(after(shift(to_edge, 0, -0.5 * kSide), turn(1, -leans)), shift(-to_edge, 0, 0.5 * kSide));
     const Pose beside_wall = after(shift(from_axis, 0, kWall + 0.5 * kSide - kDepth), leaning);
-    scene.bodies[1].pose = after(after(turn(2, towards), beside_wall), turn(2, kPi / 4 + beside));
+    scene.bodies[1].pose = after(after(turn(2, towards), beside_wall), turn(2, kHalfTurn / 4 + beside));
     const Pose motion = any_motion(random, 3);
     scene.find(motion);
     ASSERT_EQ(scene.manifolds().size(), 1u);

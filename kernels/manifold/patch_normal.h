@@ -554,7 +554,8 @@ TANDEM_HD_CALLED int NormalFinder<Team>::gather_for_deep(const CurveMeasure& cur
   const bool both_ways = joined || summary_.degenerate || !counts || !curve.by_area || surrounds_hole_;
   const Vector3 line = longest_line(curve.middle, reach), push = both_ways ? Vector3{} : own;
   Vector3 out_of_corner[2];
-  for (int side = 0; side < 2 && several_faces_; ++side) out_of_corner[side] = way_out(side, line, own);
+  for (int side = 0; side < 2 && several_faces_ && !both_ways; ++side)
+    out_of_corner[side] = way_out(side, line, own);
   gather_unlike(0, line, push);
   gather_unlike(1, line, push);
   int count = 0;

@@ -47,7 +47,7 @@ TANDEM_HD_CALLED void NormalFinder<Team>::gather_unlike(int side, const Vector3&
 }
 
 /// Returns the direction that leads away from all faces of one body that do not oppose the push: out of a
-/// corner, no face alone is the shortest way. 0 if there is none. No directions are gathered afterwards.
+/// corner, no face alone is the shortest way. The result is 0 if there is none. It forgets what was gathered.
 template <typename Team>
 TANDEM_HD_CALLED Vector3 NormalFinder<Team>::way_out(int side, const Vector3& line, const Vector3& push) {
   gather_unlike(side, line, {});

@@ -419,7 +419,7 @@ TANDEM_HD void DeepestLine<Team>::search(double reach, bool winds, const double&
     int seed = tried == 0 ? deepest : tried <= deepest ? tried - 1 : tried;
     ++tried;
     if (by_seeds) {
-      // Where faces of both bodies lie in each other, it may be no point within them.
+      // Where faces of both bodies lie in each other, a seed may be no point within them.
       const Vector3& from = shared_.seeds.at[seed];
       if (shared_.spaces.in_plane(team_, shared_.frame.flat(from), shared_.frame.height(from), rounding()))
         continue;

@@ -85,8 +85,8 @@ class CurvePlaces {
 /// inside are tilted by this much if corners or edges lie in faces.
 inline constexpr double kTilt = 0.125;
 
-/// Where lines that go inside begin: at pieces of the curve, behind their triangles; or at places within the
-/// curve, in the direction that pieces give, or the other way.
+/// Says where lines that go inside begin: at pieces of the curve, behind their triangles; or at places within
+/// the curve, in the direction that pieces give, or the other way.
 enum class LineFrom : std::uint8_t { curve, within, within_and_back };
 
 /// Lines that a team follows at once, each in a frame of its own where that is needed.

@@ -69,6 +69,16 @@ __global__ void __launch_bounds__(kThreads) count_kept(const __grid_constant__ M
   add(args.state->ambiguous_touches, ambiguous);
 }
 
+/// The greatest of the numbers of a group's lanes.
+__device__ double greatest_of_group(double number) {
+  const std::uint32_t lanes = ((1u << kLanes) - 1) << (threadIdx.x % 32 / kLanes * kLanes);
+  for (int by = kLanes / 2; by > 0; by /= 2) {
+    const double other = __shfl_xor_sync(lanes, number, by);
+    if (other > number) number = other;
+  }
+  return number;
+}
+
 /// Moves the manifolds of a pair: all lanes of a group, a point each.
 __device__ void move_pair(const ManifoldArgs& args, std::uint32_t pair, std::uint32_t row,
                           std::uint32_t lane) {
@@ -87,6 +97,7 @@ __device__ void move_pair(const ManifoldArgs& args, std::uint32_t pair, std::uin
     const std::uint32_t point_from = kept.first_point + lane;
     kept.pair = pair;
     kept.first_point = place.first_point + (kept.first_point - before.first_point);
+    double depth = -INFINITY;
     if (lane < kept.point_count) {
       const std::uint32_t point_to = kept.first_point + lane;
       const FoundPoint of_point = args.found_points_before[point_from];
@@ -96,8 +107,10 @@ __device__ void move_pair(const ManifoldArgs& args, std::uint32_t pair, std::uin
       point.manifold = to;
       args.points[point_to] = point;
       args.found_points[point_to] = of_point;
-      if (lane == 0) kept.depth = point.depth;
+      depth = point.depth;
     }
+    depth = greatest_of_group(depth);
+    if (kept.point_count > 0) kept.depth = depth;
     if (lane != 0) continue;
     args.manifolds[to] = kept;
     args.found_manifolds[to] = of_then;

@@ -39,7 +39,7 @@ class KeptMotion {
     stands_ = is_same(then[0], now[0]) && is_same(then[1], now[1]);
   }
 
-  /// Moves a manifold but for its depth, which is that of its first point.
+  /// Moves a manifold but for its depth, which is that of its deepest point.
   TANDEM_HD void move(const FoundManifold& from, Manifold& out) const {
     const Vector3 normal = of(from.normal), area = of(from.area_vector), centre = of(from.centre);
     write(normal, out.normal);

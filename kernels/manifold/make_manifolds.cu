@@ -180,6 +180,8 @@ __global__ void __launch_bounds__(kThreads, 6) begin_to_join(const __grid_consta
   const LargeTeam team(&scratch, nullptr);
   take_rows(team, args.state->several_curves, args.state->next_to_join, taken, [&](std::uint32_t row) {
     const PairCurve curve = args.curves[row];
+    if (team.rank() == 0) bodies.get() = bodies_of(args, args.pairs.pairs[curve.pair]);
+    team.sync();
     manifold::RegionFinder<LargeTeam>(team, bodies.get(), memory_of(args, curve.pair),
                                       args.summaries[curve.pair], nullptr)
         .begin(curve.curve);

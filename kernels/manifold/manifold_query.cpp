@@ -288,7 +288,7 @@ void ManifoldQuery::State::keep(std::uint32_t pair, const SceneState& scene, con
       motion.move(found.points[point_to], point);
       point.previous = match ? point_from : kNoIndex;
       point.manifold = to;
-      if (k == 0) kept.depth = point.depth;
+      kept.depth = k == 0 ? point.depth : std::max(kept.depth, point.depth);
     }
   }
 }

@@ -99,6 +99,18 @@ struct LastSign {
   TANDEM_HD int sign() const { return last > 0 ? 1 : last < 0 ? -1 : 0; }
 };
 
+/// Keeps what would be an expansion as one number of its sign, right to a few roundings.
+struct RoundedSum {
+  double sum, last;
+
+  TANDEM_HD void clear() { sum = last = 0; }
+  TANDEM_HD void append(double value) {
+    sum = plus(sum, value);
+    if (value != 0) last = value;
+  }
+  TANDEM_HD double value() const { return sum * last > 0 ? sum : last; }
+};
+
 TANDEM_HD inline void assign_difference(double a, double b, Expansion<2>& out) {
   const Rounded difference = two_sum(a, -b);
   out.clear();
@@ -195,19 +207,33 @@ TANDEM_OUT_OF_LINE TANDEM_HD inline void assign_volume_term(const Between& u, co
   assign_product(minor, wk, out);
 }
 
-/// Sign of det(u, v, w) for points in range. 64 terms for each of three products, 128 for two of them; the
-/// last sum is not stored.
-TANDEM_OUT_OF_LINE TANDEM_HD inline int expansion_volume_sign(const Between& u, const Between& v,
-                                                              const Between& w) {
+/// Assigns det(u, v, w) for points in range. 64 terms for each of three products, 128 for two of them; the
+/// last sum is not stored, but `out` learns its terms.
+template <class Out>
+TANDEM_HD inline void assign_volume(const Between& u, const Between& v, const Between& w, Out& out) {
   Expansion<128> two_terms;
   Expansion<64> x, y;
   assign_volume_term(u, v, w, 0, x);
   assign_volume_term(u, v, w, 1, y);
   assign_sum(x, y, two_terms);
   assign_volume_term(u, v, w, 2, x);
+  assign_sum(two_terms, x, out);
+}
+
+/// Sign of det(u, v, w) for points in range.
+TANDEM_OUT_OF_LINE TANDEM_HD inline int expansion_volume_sign(const Between& u, const Between& v,
+                                                              const Between& w) {
   LastSign sum;
-  assign_sum(two_terms, x, sum);
+  assign_volume(u, v, w, sum);
   return sum.sign();
+}
+
+/// det(u, v, w) for points in range, rounded, with the exact sign.
+TANDEM_OUT_OF_LINE TANDEM_HD inline double expansion_volume(const Between& u, const Between& v,
+                                                            const Between& w) {
+  RoundedSum sum;
+  assign_volume(u, v, w, sum);
+  return sum.value();
 }
 
 /// Sign of (q - p) x (r - p) seen along axis k, for points in range.

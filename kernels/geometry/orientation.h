@@ -128,6 +128,16 @@ TANDEM_HD inline bool vanishes(const Between& u, const Between& v, const Between
            (w2 && ((u0 && v1) || (u1 && v0))));
 }
 
+/// volume(p, q, r, s), rounded, with the exact sign. Of points out of the range of expansions only the sign
+/// is known, and the result is 1, 0 or -1.
+TANDEM_OUT_OF_LINE TANDEM_HD inline double rounded_volume(const double* p, const double* q, const double* r,
+                                                          const double* s) {
+  const Between u = {p, q}, v = {p, r}, w = {p, s};
+  if (vanishes(u, v, w)) return 0;
+  if (in_range(u) && in_range(v) && in_range(w)) return expansion_volume(u, v, w);
+  return wide_volume_sign(u, v, w);
+}
+
 /// Signs of exact arithmetic, for all finite points: float64 where its bound allows, expansions in their
 /// range, wide integers outside.
 struct ExactSigns {

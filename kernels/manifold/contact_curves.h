@@ -93,9 +93,10 @@ TANDEM_HD inline std::uint64_t edge_key(const TriangleTopology& t, int k) {
   return u < v ? std::uint64_t{u} << 32 | v : std::uint64_t{v} << 32 | u;
 }
 
-/// Computes once more what the triangles of a piece have in common.
+/// Computes once more what the triangles of a piece have in common. Condition: it is a polygon.
 TANDEM_HD_CALLED inline void meet_again(const BodyPair& bodies, const Piece& piece, Meeting& out) {
-  meet(bodies.a.triangle(piece.triangle[0]), bodies.b.triangle(piece.triangle[1]), bodies.tolerance(), out);
+  meeting::meet_in_plane(bodies.a.triangle(piece.triangle[0]), bodies.b.triangle(piece.triangle[1]),
+                         bodies.tolerance(), out);
 }
 
 /// The facts about all pieces together.

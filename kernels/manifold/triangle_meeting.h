@@ -1,6 +1,7 @@
 #pragma once
 #include <cstdint>
 
+#include "kernels/geometry/triangle_test.h"
 #include "tandem/kernels/detail/vector3.h"
 
 namespace tandem::manifold {
@@ -9,6 +10,11 @@ namespace tandem::manifold {
 struct WorldTriangle {
   Vector3 corner[3];
   Vector3 normal;  ///< unit, outward; 0 of a flat triangle
+
+  /// Returns whether corners go round clockwise, as seen from outside.
+  TANDEM_HD bool is_turned() const {
+    return dot(normal, cross(corner[1] - corner[0], corner[2] - corner[0])) < 0;
+  }
 };
 
 /// The part of a triangle that a point lies on: edge k joins corners k and k + 1.
@@ -47,54 +53,58 @@ namespace meeting {
 struct Heights {
   double height[3];
   int sign[3];
-  int zeros = 0, positive = 0;
+  int near = 0;  ///< bit k: corner k lies so near to the plane that rounding may decide its sign, which is 0
 
   TANDEM_HD Heights(const WorldTriangle& triangle, const WorldTriangle& plane, double tolerance) {
     for (int k = 0; k < 3; ++k) {
       height[k] = dot(plane.normal, triangle.corner[k] - plane.corner[0]);
       sign[k] = height[k] > tolerance ? 1 : height[k] < -tolerance ? -1 : 0;
-      zeros += sign[k] == 0;
-      positive += sign[k] > 0;
+      near |= sign[k] == 0 ? 1 << k : 0;
     }
   }
-  TANDEM_HD bool beside() const { return zeros == 0 && (positive == 0 || positive == 3); }
+  TANDEM_HD bool beside() const { return sign[0] != 0 && sign[0] == sign[1] && sign[0] == sign[2]; }
+  TANDEM_HD bool in_plane() const { return sign[0] == 0 && sign[1] == 0 && sign[2] == 0; }
+  TANDEM_HD bool edge_in_plane() const { return (sign[0] == 0) + (sign[1] == 0) + (sign[2] == 0) == 2; }
 };
+
+/// A point of a triangle's boundary.
+struct BoundaryPoint {
+  Vector3 x;
+  TriangleFeature feature;
+};
+
+/// Returns where an edge goes through the plane. Condition: the signs of its ends differ.
+TANDEM_HD inline BoundaryPoint crossing(const WorldTriangle& triangle, const Heights& heights, int k,
+                                        bool of_b) {
+  const int next = k == 2 ? 0 : k + 1;
+  const Vector3& x = triangle.corner[k];
+  const double part = heights.height[k] / (heights.height[k] - heights.height[next]);
+  const auto side = static_cast<std::uint8_t>(of_b ? 1 : 0);
+  return {x + part * (triangle.corner[next] - x), {side, 0, static_cast<std::uint8_t>(k)}};
+}
 
 /// The part of a triangle that lies in the other's plane, along the line that both planes have in common.
 struct Stretch {
   double at[2];  // ascending
-  Vector3 point[2];
-  TriangleFeature feature[2];
-  int points = 0;
-
-  TANDEM_HD void add(const Vector3& x, double along, const TriangleFeature& f) {
-    if (points == 2) return;
-    if (points == 1 && along < at[0]) {
-      at[1] = at[0], point[1] = point[0], feature[1] = feature[0];
-      at[0] = along, point[0] = x, feature[0] = f;
-    } else if (points == 1) {
-      at[1] = along, point[1] = x, feature[1] = f;
-    } else {
-      at[0] = at[1] = along, point[0] = point[1] = x, feature[0] = feature[1] = f;
-    }
-    ++points;
-  }
+  BoundaryPoint point[2];
 };
 
+/// Condition: no corner lies in the plane, and they lie on both sides.
 TANDEM_HD inline Stretch stretch(const WorldTriangle& triangle, const Heights& heights, const Vector3& line,
                                  const Vector3& origin, bool of_b) {
   Stretch out;
-  const std::uint8_t side = of_b ? 1 : 0;
+  int points = 0;
   for (int k = 0; k < 3; ++k) {
-    const int next = k == 2 ? 0 : k + 1;
-    const Vector3& x = triangle.corner[k];
-    const auto number = static_cast<std::uint8_t>(k);
-    if (heights.sign[k] == 0) {
-      out.add(x, dot(line, x - origin), {side, 1, number});
-    } else if (heights.sign[k] * heights.sign[next] < 0) {
-      const double part = heights.height[k] / (heights.height[k] - heights.height[next]);
-      const Vector3 y = x + part * (triangle.corner[next] - x);
-      out.add(y, dot(line, y - origin), {side, 0, number});
+    if (heights.sign[k] == heights.sign[k == 2 ? 0 : k + 1]) continue;
+    const BoundaryPoint point = crossing(triangle, heights, k, of_b);
+    const double along = dot(line, point.x - origin);
+    if (points++ == 0) {
+      out.at[0] = along, out.point[0] = point;
+    } else if (along < out.at[0]) {
+      out.at[1] = out.at[0], out.point[1] = out.point[0];
+      out.at[0] = along, out.point[0] = point;
+    } else {
+      out.at[1] = along, out.point[1] = point;
     }
   }
   return out;
@@ -126,7 +136,7 @@ TANDEM_HD inline void meet_in_plane(const WorldTriangle& a, const WorldTriangle&
   Vector2 polygon[kMostCorners + 1] = {flat(b.corner[0]), flat(b.corner[1]), flat(b.corner[2])};
   Vector2 next[kMostCorners + 1];
   int count = 3;
-  const bool turned = dot(a.normal, cross(a.corner[1] - a.corner[0], a.corner[2] - a.corner[0])) < 0;
+  const bool turned = a.is_turned();
   for (int k = 0; k < 3 && count > 0; ++k) {
     const int from = turned ? (3 - k) % 3 : k, to = turned ? 2 - k : (k + 1) % 3;
     count = cut(polygon, count, flat(a.corner[from]), flat(a.corner[to]), next);
@@ -146,6 +156,84 @@ TANDEM_HD inline void meet_in_plane(const WorldTriangle& a, const WorldTriangle&
   for (int i = 0; i < out.corners; ++i) out.corner[i] = a.corner[0] + polygon[i].x * u + polygon[i].y * v;
 }
 
+/// The corners of two triangles, as exact arithmetic takes them.
+TANDEM_HD inline TrianglePair corners_of(const WorldTriangle& a, const WorldTriangle& b) {
+  TrianglePair out;
+  for (int k = 0; k < 3; ++k) {
+    const Vector3 &x = a.corner[k], &y = b.corner[k];
+    out.a[k][0] = x.x, out.a[k][1] = x.y, out.a[k][2] = x.z;
+    out.b[k][0] = y.x, out.b[k][1] = y.y, out.b[k][2] = y.z;
+  }
+  return out;
+}
+
+/// Gives corners near the plane their exact signs, and heights that are right even there.
+TANDEM_HD inline void settle(Heights& heights, const double (*triangle)[3], const double (*plane)[3],
+                             const WorldTriangle& of_plane) {
+  const Vector3 across =
+      cross(of_plane.corner[1] - of_plane.corner[0], of_plane.corner[2] - of_plane.corner[0]);
+  const double by_area = 1 / dot(of_plane.normal, across);
+  TANDEM_ROLLED
+  for (int k = 0; k < 3; ++k) {
+    if ((heights.near >> k & 1) == 0) continue;
+    heights.height[k] = by_area * detail::rounded_volume(plane[0], plane[1], plane[2], triangle[k]);
+    heights.sign[k] = detail::computed_sign(heights.height[k]);
+  }
+}
+
+/// A triangle that meets a plane: p is its lone corner, and q and r follow, or the other way round, as
+/// detail::order_corners() has them.
+struct OrderedCorners {
+  int p, q, r;
+
+  TANDEM_HD OrderedCorners(int lone, bool reversed)
+      : p(lone), q((lone + (reversed ? 2 : 1)) % 3), r((lone + (reversed ? 1 : 2)) % 3) {}
+};
+
+/// Returns the point in the other's plane on the edge from corner p to another one.
+TANDEM_HD inline BoundaryPoint point_in_plane(const WorldTriangle& triangle, const Heights& heights, int p,
+                                              int to, bool of_b) {
+  const auto side = static_cast<std::uint8_t>(of_b ? 1 : 0);
+  const int corner = heights.sign[p] == 0 ? p : to;
+  if (heights.sign[corner] == 0)
+    return {triangle.corner[corner], {side, 1, static_cast<std::uint8_t>(corner)}};
+  return crossing(triangle, heights, (p + 1) % 3 == to ? p : to, of_b);
+}
+
+/// Finds what triangles have in common of which a corner lies near the other's plane. Signs are exact, so the
+/// two triangles of an edge agree whether it goes through a third one, and curves close.
+TANDEM_OUT_OF_LINE TANDEM_HD inline void meet_exactly(const WorldTriangle& a, const WorldTriangle& b,
+                                                      double tolerance, Heights& of_a, Heights& of_b,
+                                                      Meeting& out) {
+  const TrianglePair t = corners_of(a, b);
+  settle(of_a, t.a, t.b, b);
+  settle(of_b, t.b, t.a, a);
+  if (of_a.beside() || of_b.beside()) return;
+  out.degenerate = true;
+  if (of_a.in_plane() || of_b.in_plane()) return meet_in_plane(a, b, tolerance, out);
+  const int lone_a = detail::lone_corner(of_a.sign), lone_b = detail::lone_corner(of_b.sign);
+  const bool a_below = detail::lone_is_below(of_a.sign, lone_a),
+             b_below = detail::lone_is_below(of_b.sign, lone_b);
+  const OrderedCorners in_a(lone_a, b_below != a.is_turned()), in_b(lone_b, a_below != b.is_turned());
+  // Along D, see the proof of order_corners(), the triangles reach from i (on pq of a) to j (on pr), and from
+  // l (on pr of b) to k (on pq). In the same way as there, volume(pa, pb, qa, rb) >= 0 if and only if i <= l.
+  const auto order = [&](int of_a, int of_b) {
+    return detail::ExactSigns::volume(t.a[in_a.p], t.b[in_b.p], t.a[of_a], t.b[of_b]);
+  };
+  if (order(in_a.q, in_b.q) < 0 || order(in_a.r, in_b.r) > 0) return;
+  const bool begins_in_b = order(in_a.q, in_b.r) >= 0, ends_in_a = order(in_a.r, in_b.q) >= 0;
+  const BoundaryPoint begin = begins_in_b ? point_in_plane(b, of_b, in_b.p, in_b.r, true)
+                                          : point_in_plane(a, of_a, in_a.p, in_a.q, false);
+  const BoundaryPoint end = ends_in_a ? point_in_plane(a, of_a, in_a.p, in_a.r, false)
+                                      : point_in_plane(b, of_b, in_b.p, in_b.q, true);
+  const int first =
+      a_below == b_below ? 1 : 0;  // D is normal_b x normal_a, both turned towards the other's p
+  out.end[first] = begin.x, out.end[1 - first] = end.x;
+  out.feature[first] = begin.feature, out.feature[1 - first] = end.feature;
+  out.kind = norm(end.x - begin.x) <= tolerance ? MeetingKind::point : MeetingKind::segment;
+  out.along_edge[0] = of_a.edge_in_plane(), out.along_edge[1] = of_b.edge_in_plane();
+}
+
 }  // namespace meeting
 
 /// Fills `out`. tolerance: lengths by which points may lie beside a plane and count as in it.
@@ -158,25 +246,23 @@ TANDEM_HD inline void meet(const WorldTriangle& a, const WorldTriangle& b, doubl
   out.along_edge[0] = out.along_edge[1] = false;
   const auto is_flat = [](const Vector3& n) { return n.x == 0 && n.y == 0 && n.z == 0; };
   if (is_flat(a.normal) || is_flat(b.normal)) return;  // neighbours have its sides
-  const Heights of_a(a, b, tolerance), of_b(b, a, tolerance);
+  Heights of_a(a, b, tolerance), of_b(b, a, tolerance);
   if (of_a.beside() || of_b.beside()) return;
-  if (of_a.zeros == 3 || of_b.zeros == 3) return meeting::meet_in_plane(a, b, tolerance, out);
+  if ((of_a.near | of_b.near) != 0) return meeting::meet_exactly(a, b, tolerance, of_a, of_b, out);
   Vector3 line = cross(a.normal, b.normal);
   const double sine = norm(line);
   if (sine == 0) return;
   line = (1 / sine) * line;
-  out.degenerate = of_a.zeros + of_b.zeros > 0;
   const Stretch in_a = meeting::stretch(a, of_a, line, a.corner[0], false);
   const Stretch in_b = meeting::stretch(b, of_b, line, a.corner[0], true);
   const bool begins_in_a = in_a.at[0] >= in_b.at[0], ends_in_a = in_a.at[1] <= in_b.at[1];
   const double begin = begins_in_a ? in_a.at[0] : in_b.at[0], end = ends_in_a ? in_a.at[1] : in_b.at[1];
   if (!(end >= begin - tolerance)) return;
   out.kind = end <= begin + tolerance ? MeetingKind::point : MeetingKind::segment;
-  out.end[0] = begins_in_a ? in_a.point[0] : in_b.point[0];
-  out.end[1] = ends_in_a ? in_a.point[1] : in_b.point[1];
-  out.feature[0] = begins_in_a ? in_a.feature[0] : in_b.feature[0];
-  out.feature[1] = ends_in_a ? in_a.feature[1] : in_b.feature[1];
-  out.along_edge[0] = of_a.zeros == 2, out.along_edge[1] = of_b.zeros == 2;
+  const meeting::BoundaryPoint &first = begins_in_a ? in_a.point[0] : in_b.point[0],
+                               &last = ends_in_a ? in_a.point[1] : in_b.point[1];
+  out.end[0] = first.x, out.end[1] = last.x;
+  out.feature[0] = first.feature, out.feature[1] = last.feature;
 }
 
 }  // namespace tandem::manifold

@@ -23,9 +23,7 @@ struct alignas(16) Piece {
 
   TANDEM_HD MeetingKind kind() const { return static_cast<MeetingKind>(info & 3u); }
   TANDEM_HD bool facing() const { return (info & kFacing) != 0; }
-  TANDEM_HD double weight() const {
-    return ((info & kHalfOfA) != 0 ? 0.5 : 1) * ((info & kHalfOfB) != 0 ? 0.5 : 1);
-  }
+  TANDEM_HD double weight() const { return 1 - 0.5 * (info / kParted & 3u); }
   TANDEM_HD TriangleFeature feature(int end_number) const {
     const std::uint32_t bits = info >> (8 + 4 * end_number);
     return {static_cast<std::uint8_t>(bits & 1u), static_cast<std::uint8_t>(bits >> 1 & 1u),
@@ -43,7 +41,7 @@ struct alignas(16) Piece {
     return kind() == MeetingKind::polygon ? end[0] : 0.5 * (end[0] + end[1]);
   }
 
-  static constexpr std::uint32_t kFacing = 4, kHalfOfA = 8, kHalfOfB = 16, kDegenerate = 32;
+  static constexpr std::uint32_t kFacing = 4, kParted = 8, kDegenerate = 32;
 };
 static_assert(sizeof(Piece) == 64);
 
@@ -137,10 +135,8 @@ TANDEM_HD inline void write_piece(const PieceMemory& memory, std::uint32_t at, c
   Piece& piece = memory.pieces[at];
   piece.triangle[0] = contact.triangle_a, piece.triangle[1] = contact.triangle_b;
   piece.info = static_cast<std::uint32_t>(meeting.kind) | (meeting.facing ? Piece::kFacing : 0u) |
-               (meeting.along_edge[0] ? Piece::kHalfOfA : 0u) |
-               (meeting.along_edge[1] ? Piece::kHalfOfB : 0u) |
-               (meeting.degenerate ? Piece::kDegenerate : 0u) | bits_of(meeting.feature[0]) << 8 |
-               bits_of(meeting.feature[1]) << 12;
+               meeting.parted * Piece::kParted | (meeting.degenerate ? Piece::kDegenerate : 0u) |
+               bits_of(meeting.feature[0]) << 8 | bits_of(meeting.feature[1]) << 12;
   piece.joined = 0;
   piece.end[0] = meeting.end[0];
   piece.end[1] = meeting.end[1];

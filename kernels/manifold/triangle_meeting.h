@@ -36,9 +36,9 @@ struct Meeting {
   Vector3 end[2];           ///< of a segment, run along as normal_a x normal_b points; of a point, twice
   TriangleFeature feature[2] = {};
 
-  /// Says whether the segment is an edge of a, and of b. Then it counts half, and half again: neighbours that
-  /// share the edge, or a body that only touches there, have the rest.
-  bool along_edge[2] = {};
+  /// Of the two ways of moving b by less than anything that there is, those in which the triangles do not
+  /// meet any more: each takes half of the segment's weight.
+  std::uint8_t parted = 0;
 
   // These describe a polygon: the triangles lie in one plane.
   int corners = 0;
@@ -64,7 +64,7 @@ struct Heights {
   }
   TANDEM_HD bool beside() const { return sign[0] != 0 && sign[0] == sign[1] && sign[0] == sign[2]; }
   TANDEM_HD bool in_plane() const { return sign[0] == 0 && sign[1] == 0 && sign[2] == 0; }
-  TANDEM_HD bool edge_in_plane() const { return (sign[0] == 0) + (sign[1] == 0) + (sign[2] == 0) == 2; }
+  TANDEM_HD bool any_in_plane() const { return sign[0] * sign[1] * sign[2] == 0; }
 };
 
 /// A point of a triangle's boundary.
@@ -167,7 +167,8 @@ TANDEM_HD inline TrianglePair corners_of(const WorldTriangle& a, const WorldTria
   return out;
 }
 
-/// Gives corners near the plane their exact signs, and heights that are right even there.
+/// Gives corners near the plane heights that are right even there, and all corners the signs that they have
+/// where the plane's triangle is looked at as its corners go round.
 TANDEM_HD inline void settle(Heights& heights, const double (*triangle)[3], const double (*plane)[3],
                              const WorldTriangle& of_plane) {
   const Vector3 across =
@@ -179,6 +180,7 @@ TANDEM_HD inline void settle(Heights& heights, const double (*triangle)[3], cons
     heights.height[k] = by_area * detail::rounded_volume(plane[0], plane[1], plane[2], triangle[k]);
     heights.sign[k] = detail::computed_sign(heights.height[k]);
   }
+  for (int k = 0; k < 3 && by_area < 0; ++k) heights.sign[k] = -heights.sign[k];
 }
 
 /// A triangle that meets a plane: p is its lone corner, and q and r follow, or the other way round, as
@@ -186,8 +188,49 @@ TANDEM_HD inline void settle(Heights& heights, const double (*triangle)[3], cons
 struct OrderedCorners {
   int p, q, r;
 
-  TANDEM_HD OrderedCorners(int lone, bool reversed)
-      : p(lone), q((lone + (reversed ? 2 : 1)) % 3), r((lone + (reversed ? 1 : 2)) % 3) {}
+  TANDEM_HD OrderedCorners(const int* side, bool reversed) : p(detail::lone_corner(side)) {
+    q = (p + (reversed ? 2 : 1)) % 3, r = (p + (reversed ? 1 : 2)) % 3;
+  }
+};
+
+TANDEM_HD inline bool is_below(const int* side) {
+  return detail::lone_is_below(side, detail::lone_corner(side));
+}
+
+/// Two triangles of which b is moved in an arbitrary direction by less than anything that there is: forwards
+/// where way is 1, and backwards where it is -1. Then no corner lies in the other's plane, and no edges meet
+/// or are in one plane where these signs matter.
+class MovedPair {
+ public:
+  TANDEM_HD MovedPair(const TrianglePair& t, int way) : t_(t), way_(way) {}
+
+  TANDEM_HD bool meet(const int* side_of_a, const int* side_of_b) const {
+    const auto turn_of = [&](const double(&x)[3][3]) { return sign_along({x[0], x[1]}, {x[0], x[2]}); };
+    const int turn_of_a = turn_of(t_.a), turn_of_b = turn_of(t_.b);
+    int of_a[3], of_b[3];
+    for (int k = 0; k < 3; ++k) {
+      of_a[k] = side_of_a[k] != 0 ? side_of_a[k] : -turn_of_b;
+      of_b[k] = side_of_b[k] != 0 ? side_of_b[k] : turn_of_a;
+    }
+    if (detail::strictly_on_one_side(of_a) || detail::strictly_on_one_side(of_b)) return false;
+    const OrderedCorners a(of_a, is_below(of_b)), b(of_b, is_below(of_a));
+    return order(a.p, b.p, a.q, b.q) > 0 && order(a.p, b.p, a.r, b.r) < 0;
+  }
+
+ private:
+  /// The sign by which det(way, u, v) changes what is 0.
+  TANDEM_HD int sign_along(const detail::Between& u, const detail::Between& v) const {
+    constexpr double kOrigin[3] = {0, 0, 0}, kDirection[3] = {0.57290, 0.69314, 0.43776};
+    return way_ * detail::ExactSigns::volume_without_bound({kOrigin, kDirection}, u, v);
+  }
+  /// The sign of volume(pa, pb, qa, qb). Its derivative by the way is det(way, qa - pa, qb - pb).
+  TANDEM_HD int order(int pa, int pb, int qa, int qb) const {
+    const int sign = detail::ExactSigns::volume(t_.a[pa], t_.b[pb], t_.a[qa], t_.b[qb]);
+    return sign != 0 ? sign : sign_along({t_.a[pa], t_.a[qa]}, {t_.b[pb], t_.b[qb]});
+  }
+
+  const TrianglePair& t_;
+  int way_;
 };
 
 /// Returns the point in the other's plane on the edge from corner p to another one.
@@ -211,10 +254,8 @@ TANDEM_OUT_OF_LINE TANDEM_HD inline void meet_exactly(const WorldTriangle& a, co
   if (of_a.beside() || of_b.beside()) return;
   out.degenerate = true;
   if (of_a.in_plane() || of_b.in_plane()) return meet_in_plane(a, b, tolerance, out);
-  const int lone_a = detail::lone_corner(of_a.sign), lone_b = detail::lone_corner(of_b.sign);
-  const bool a_below = detail::lone_is_below(of_a.sign, lone_a),
-             b_below = detail::lone_is_below(of_b.sign, lone_b);
-  const OrderedCorners in_a(lone_a, b_below != a.is_turned()), in_b(lone_b, a_below != b.is_turned());
+  const bool a_below = is_below(of_a.sign), b_below = is_below(of_b.sign);
+  const OrderedCorners in_a(of_a.sign, b_below), in_b(of_b.sign, a_below);
   // Along D, see the proof of order_corners(), the triangles reach from i (on pq of a) to j (on pr), and from
   // l (on pr of b) to k (on pq). In the same way as there, volume(pa, pb, qa, rb) >= 0 if and only if i <= l.
   const auto order = [&](int of_a, int of_b) {
@@ -231,7 +272,9 @@ TANDEM_OUT_OF_LINE TANDEM_HD inline void meet_exactly(const WorldTriangle& a, co
   out.end[first] = begin.x, out.end[1 - first] = end.x;
   out.feature[first] = begin.feature, out.feature[1 - first] = end.feature;
   out.kind = norm(end.x - begin.x) <= tolerance ? MeetingKind::point : MeetingKind::segment;
-  out.along_edge[0] = of_a.edge_in_plane(), out.along_edge[1] = of_b.edge_in_plane();
+  if (!of_a.any_in_plane() && !of_b.any_in_plane()) return;
+  const auto parts = [&](int way) { return !MovedPair(t, way).meet(of_a.sign, of_b.sign); };
+  out.parted = static_cast<std::uint8_t>(parts(-1) + parts(1));
 }
 
 }  // namespace meeting
@@ -243,7 +286,7 @@ TANDEM_HD inline void meet(const WorldTriangle& a, const WorldTriangle& b, doubl
   out.degenerate = out.facing = false;
   out.corners = 0;
   out.feature[0] = out.feature[1] = {};
-  out.along_edge[0] = out.along_edge[1] = false;
+  out.parted = 0;
   const auto is_flat = [](const Vector3& n) { return n.x == 0 && n.y == 0 && n.z == 0; };
   if (is_flat(a.normal) || is_flat(b.normal)) return;  // neighbours have its sides
   Heights of_a(a, b, tolerance), of_b(b, a, tolerance);

@@ -167,17 +167,57 @@ TANDEM_HD inline TrianglePair corners_of(const WorldTriangle& a, const WorldTria
   return out;
 }
 
+/// Exact signs of what two triangles span.
+class ExactVolumes {
+ public:
+  TANDEM_HD explicit ExactVolumes(const TrianglePair& t) : on_grid_(detail::on_coarse_grid(t)) {}
+
+  /// volume() of a triangle and a point, rounded, with the exact sign. plane: of the triangle.
+  TANDEM_HD double rounded(const detail::Plane<double>& plane, const double (*t)[3], const double* s) const {
+    double bound;
+    return on_grid_ ? plane.volume(s, bound) : detail::rounded_volume(t[0], t[1], t[2], s);
+  }
+  TANDEM_HD int sign(const double* p, const double* q, const double* r, const double* s) const {
+    double bound;
+    const double volume = detail::Plane<double>(p, q, r).volume(s, bound);
+    const int sign = detail::certain_sign(volume, on_grid_ ? 0 : bound);
+    if (sign != 0 || on_grid_) return sign;
+    return detail::ExactSigns::volume_without_bound({p, q}, {p, r}, {p, s});
+  }
+
+  /// The sign of det(w, u, v) for an arbitrary w. On a coarse grid, float64 computes it without rounding: its
+  /// whole numbers are below 2^17, so that products are below 2^(17 + 33) of the grid's unit.
+  TANDEM_HD int sign_along_any(const detail::Between& u, const detail::Between& v) const {
+    constexpr double kOrigin[3] = {0, 0, 0}, kAny[3] = {92431, 120577, 71263};
+    double sum = 0, bound = 0;
+    for (int k = 0; k < 3; ++k) {
+      const int i = (k + 1) % 3, j = (k + 2) % 3;
+      const double ui = u.to[i] - u.from[i], uj = u.to[j] - u.from[j], vi = v.to[i] - v.from[i],
+                   vj = v.to[j] - v.from[j];
+      sum += kAny[k] * (ui * vj - uj * vi);
+      bound += kAny[k] * (std::fabs(ui * vj) + std::fabs(uj * vi));
+    }
+    const int sign = detail::certain_sign(sum, on_grid_ ? 0 : 0x1p-48 * bound + 0x1p-900);
+    if (sign != 0 || on_grid_) return sign;
+    return detail::ExactSigns::volume_without_bound({kOrigin, kAny}, u, v);
+  }
+
+ private:
+  bool on_grid_;
+};
+
 /// Gives corners near the plane heights that are right even there, and all corners the signs that they have
 /// where the plane's triangle is looked at as its corners go round.
 TANDEM_HD inline void settle(Heights& heights, const double (*triangle)[3], const double (*plane)[3],
-                             const WorldTriangle& of_plane) {
+                             const WorldTriangle& of_plane, const ExactVolumes& volumes) {
   const Vector3 across =
       cross(of_plane.corner[1] - of_plane.corner[0], of_plane.corner[2] - of_plane.corner[0]);
   const double by_area = 1 / dot(of_plane.normal, across);
+  const detail::Plane<double> minors(plane[0], plane[1], plane[2]);
   TANDEM_ROLLED
   for (int k = 0; k < 3; ++k) {
     if ((heights.near >> k & 1) == 0) continue;
-    heights.height[k] = by_area * detail::rounded_volume(plane[0], plane[1], plane[2], triangle[k]);
+    heights.height[k] = by_area * volumes.rounded(minors, plane, triangle[k]);
     heights.sign[k] = detail::computed_sign(heights.height[k]);
   }
   for (int k = 0; k < 3 && by_area < 0; ++k) heights.sign[k] = -heights.sign[k];
@@ -202,7 +242,8 @@ TANDEM_HD inline bool is_below(const int* side) {
 /// or are in one plane where these signs matter.
 class MovedPair {
  public:
-  TANDEM_HD MovedPair(const TrianglePair& t, int way) : t_(t), way_(way) {}
+  TANDEM_HD MovedPair(const TrianglePair& t, const ExactVolumes& volumes, int way)
+      : t_(t), volumes_(volumes), way_(way) {}
 
   TANDEM_HD bool meet(const int* side_of_a, const int* side_of_b) const {
     const auto turn_of = [&](const double(&x)[3][3]) { return sign_along({x[0], x[1]}, {x[0], x[2]}); };
@@ -218,18 +259,17 @@ class MovedPair {
   }
 
  private:
-  /// The sign by which det(way, u, v) changes what is 0.
   TANDEM_HD int sign_along(const detail::Between& u, const detail::Between& v) const {
-    constexpr double kOrigin[3] = {0, 0, 0}, kDirection[3] = {0.57290, 0.69314, 0.43776};
-    return way_ * detail::ExactSigns::volume_without_bound({kOrigin, kDirection}, u, v);
+    return way_ * volumes_.sign_along_any(u, v);
   }
   /// The sign of volume(pa, pb, qa, qb). Its derivative by the way is det(way, qa - pa, qb - pb).
   TANDEM_HD int order(int pa, int pb, int qa, int qb) const {
-    const int sign = detail::ExactSigns::volume(t_.a[pa], t_.b[pb], t_.a[qa], t_.b[qb]);
+    const int sign = volumes_.sign(t_.a[pa], t_.b[pb], t_.a[qa], t_.b[qb]);
     return sign != 0 ? sign : sign_along({t_.a[pa], t_.a[qa]}, {t_.b[pb], t_.b[qb]});
   }
 
   const TrianglePair& t_;
+  const ExactVolumes& volumes_;
   int way_;
 };
 
@@ -249,8 +289,9 @@ TANDEM_OUT_OF_LINE TANDEM_HD inline void meet_exactly(const WorldTriangle& a, co
                                                       double tolerance, Heights& of_a, Heights& of_b,
                                                       Meeting& out) {
   const TrianglePair t = corners_of(a, b);
-  settle(of_a, t.a, t.b, b);
-  settle(of_b, t.b, t.a, a);
+  const ExactVolumes volumes(t);
+  settle(of_a, t.a, t.b, b, volumes);
+  settle(of_b, t.b, t.a, a, volumes);
   if (of_a.beside() || of_b.beside()) return;
   out.degenerate = true;
   if (of_a.in_plane() || of_b.in_plane()) return meet_in_plane(a, b, tolerance, out);
@@ -259,7 +300,7 @@ TANDEM_OUT_OF_LINE TANDEM_HD inline void meet_exactly(const WorldTriangle& a, co
   // Along D, see the proof of order_corners(), the triangles reach from i (on pq of a) to j (on pr), and from
   // l (on pr of b) to k (on pq). In the same way as there, volume(pa, pb, qa, rb) >= 0 if and only if i <= l.
   const auto order = [&](int of_a, int of_b) {
-    return detail::ExactSigns::volume(t.a[in_a.p], t.b[in_b.p], t.a[of_a], t.b[of_b]);
+    return volumes.sign(t.a[in_a.p], t.b[in_b.p], t.a[of_a], t.b[of_b]);
   };
   if (order(in_a.q, in_b.q) < 0 || order(in_a.r, in_b.r) > 0) return;
   const bool begins_in_b = order(in_a.q, in_b.r) >= 0, ends_in_a = order(in_a.r, in_b.q) >= 0;
@@ -272,8 +313,8 @@ TANDEM_OUT_OF_LINE TANDEM_HD inline void meet_exactly(const WorldTriangle& a, co
   out.end[first] = begin.x, out.end[1 - first] = end.x;
   out.feature[first] = begin.feature, out.feature[1 - first] = end.feature;
   out.kind = norm(end.x - begin.x) <= tolerance ? MeetingKind::point : MeetingKind::segment;
-  if (!of_a.any_in_plane() && !of_b.any_in_plane()) return;
-  const auto parts = [&](int way) { return !MovedPair(t, way).meet(of_a.sign, of_b.sign); };
+  if (out.kind == MeetingKind::point || !(of_a.any_in_plane() || of_b.any_in_plane())) return;
+  const auto parts = [&](int way) { return !MovedPair(t, volumes, way).meet(of_a.sign, of_b.sign); };
   out.parted = static_cast<std::uint8_t>(parts(-1) + parts(1));
 }
 

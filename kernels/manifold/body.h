@@ -75,8 +75,8 @@ struct BodyPair {
   /// A point that moves with the bodies, whichever of them is a.
   TANDEM_HD Vector3 middle() const { return 0.5 * (a.centre + b.centre); }
   TANDEM_HD double smaller_diagonal() const { return std::fmin(a.shape->diagonal, b.shape->diagonal); }
-  /// Points so far beside a plane count as in it: some hundred times what rounding of posed points and of
-  /// their distance amounts to.
+  /// Rounding may decide on which side of a plane points lie that are no further from it: some hundred times
+  /// what rounding of posed points and of their distance amounts to.
   TANDEM_HD double tolerance() const { return 0x1p-44 * reach(); }
 };
 

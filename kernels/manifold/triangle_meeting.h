@@ -32,7 +32,7 @@ inline constexpr int kMostCorners = 6;
 /// The segment or polygon that two triangles have in common.
 struct Meeting {
   MeetingKind kind = MeetingKind::none;
-  bool degenerate = false;  ///< a corner lies in the other's plane
+  bool degenerate = false;  ///< a corner lies in the other's plane, or so near that rounding might decide
   Vector3 end[2];           ///< of a segment, run along as normal_a x normal_b points; of a point, twice
   TriangleFeature feature[2] = {};
 
@@ -216,11 +216,14 @@ TANDEM_HD inline void settle(Heights& heights, const double (*triangle)[3], cons
   const detail::Plane<double> minors(plane[0], plane[1], plane[2]);
   TANDEM_ROLLED
   for (int k = 0; k < 3; ++k) {
-    if ((heights.near >> k & 1) == 0) continue;
-    heights.height[k] = by_area * volumes.rounded(minors, plane, triangle[k]);
-    heights.sign[k] = detail::computed_sign(heights.height[k]);
+    if ((heights.near >> k & 1) != 0) {
+      const double volume = volumes.rounded(minors, plane, triangle[k]);
+      heights.height[k] = by_area * volume;
+      heights.sign[k] = detail::computed_sign(volume);
+    } else if (by_area < 0) {
+      heights.sign[k] = -heights.sign[k];
+    }
   }
-  for (int k = 0; k < 3 && by_area < 0; ++k) heights.sign[k] = -heights.sign[k];
 }
 
 /// A triangle that meets a plane: p is its lone corner, and q and r follow, or the other way round, as
@@ -299,8 +302,8 @@ TANDEM_OUT_OF_LINE TANDEM_HD inline void meet_exactly(const WorldTriangle& a, co
   const OrderedCorners in_a(of_a.sign, b_below), in_b(of_b.sign, a_below);
   // Along D, see the proof of order_corners(), the triangles reach from i (on pq of a) to j (on pr), and from
   // l (on pr of b) to k (on pq). In the same way as there, volume(pa, pb, qa, rb) >= 0 if and only if i <= l.
-  const auto order = [&](int of_a, int of_b) {
-    return volumes.sign(t.a[in_a.p], t.b[in_b.p], t.a[of_a], t.b[of_b]);
+  const auto order = [&](int to_a, int to_b) {
+    return volumes.sign(t.a[in_a.p], t.b[in_b.p], t.a[to_a], t.b[to_b]);
   };
   if (order(in_a.q, in_b.q) < 0 || order(in_a.r, in_b.r) > 0) return;
   const bool begins_in_b = order(in_a.q, in_b.r) >= 0, ends_in_a = order(in_a.r, in_b.q) >= 0;
@@ -308,8 +311,8 @@ TANDEM_OUT_OF_LINE TANDEM_HD inline void meet_exactly(const WorldTriangle& a, co
                                           : point_in_plane(a, of_a, in_a.p, in_a.q, false);
   const BoundaryPoint end = ends_in_a ? point_in_plane(a, of_a, in_a.p, in_a.r, false)
                                       : point_in_plane(b, of_b, in_b.p, in_b.q, true);
-  const int first =
-      a_below == b_below ? 1 : 0;  // D is normal_b x normal_a, both turned towards the other's p
+  // D is normal_b x normal_a, if both are turned towards the other's p.
+  const int first = (a_below != b_below) == (a.is_turned() != b.is_turned()) ? 1 : 0;
   out.end[first] = begin.x, out.end[1 - first] = end.x;
   out.feature[first] = begin.feature, out.feature[1 - first] = end.feature;
   out.kind = norm(end.x - begin.x) <= tolerance ? MeetingKind::point : MeetingKind::segment;
@@ -320,7 +323,7 @@ TANDEM_OUT_OF_LINE TANDEM_HD inline void meet_exactly(const WorldTriangle& a, co
 
 }  // namespace meeting
 
-/// Fills `out`. tolerance: lengths by which points may lie beside a plane and count as in it.
+/// Fills `out`. tolerance: signs of points no further from a plane are found exactly.
 TANDEM_HD inline void meet(const WorldTriangle& a, const WorldTriangle& b, double tolerance, Meeting& out) {
   using meeting::Heights, meeting::Stretch;
   out.kind = MeetingKind::none;

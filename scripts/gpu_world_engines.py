@@ -121,13 +121,13 @@ class Newton(OnWarp):
     def __init__(self, pile, device, folder):
         super().__init__(device)
         import newton
-        warp, builder = self.warp, newton.ModelBuilder(gravity=-GRAVITY)
+        warp, builder = self.warp, newton.ModelBuilder(gravity=(0.0, 0.0, -GRAVITY))
         shape = newton.ModelBuilder.ShapeConfig(density=DENSITY, mu=FRICTION, gap=self.gap)
         mesh = newton.Mesh(pile.vertices.astype("f4"), pile.triangles.astype("i4").ravel())
         if self.device.is_cuda:
             mesh.build_sdf(**self.field)
-        for centre, half in pile.boxes:
-            builder.add_shape_box(-1, xform=warp.transform(centre, warp.quat_identity()), hx=half[0], hy=half[1], hz=half[2], cfg=shape)
+        for point, normal in pile.planes():
+            builder.add_shape_plane(plane=(*normal, -float(np.dot(point, normal))), width=0.0, length=0.0, cfg=shape)
         for rotation, translation in zip(pile.rotation, pile.translation):
             turn = np.roll(rotations.quaternion(rotation), -1)
             builder.add_shape_mesh(builder.add_body(xform=warp.transform(translation, warp.quat(*turn))), mesh=mesh, cfg=shape)
@@ -195,13 +195,13 @@ class MuJoCoWarp(OnWarp):
         self.bodies, self.most = slice(1, 1 + pile.count), 0
 
     def xml(self, pile):
-        boxes = "".join(f'<geom type="box" pos="{numbers(centre)}" size="{numbers(half)}"/>' for centre, half in pile.boxes)
+        planes = "".join(f'<geom type="plane" pos="{numbers(point)}" zaxis="{numbers(normal)}" size="0 0 1"/>' for point, normal in pile.planes())
         bodies = "".join(f'<body pos="{numbers(translation)}" quat="{numbers(rotations.quaternion(rotation))}"><freejoint/><geom type="{self.geom}" mesh="body"/></body>'
                          for rotation, translation in zip(pile.rotation, pile.translation))
         return (f'<mujoco><size memory="4G"/><option timestep="{DT / 8:.17g}" gravity="0 0 {-GRAVITY}" sdf_iterations="10" sdf_initpoints="40"/>'
                 f'<default><geom density="{DENSITY}" friction="{FRICTION}" {self.contact}/></default>'
                 f'<asset><mesh name="body" inertia="exact" vertex="{numbers(pile.vertices)}" face="{" ".join(map(str, pile.triangles.ravel()))}"/></asset>'
-                f'<worldbody>{boxes}{bodies}</worldbody></mujoco>')
+                f'<worldbody>{planes}{bodies}</worldbody></mujoco>')
 
     def advance(self):
         for _ in range(8):
@@ -237,8 +237,8 @@ class Genesis(Stepped):
         self.scene = gs.Scene(sim_options=gs.options.SimOptions(dt=DT / 2, gravity=(0, 0, -GRAVITY)),
                               rigid_options=gs.options.RigidOptions(max_collision_pairs=20 * pile.count), show_viewer=False)
         material = gs.materials.Rigid(rho=DENSITY, friction=FRICTION)
-        for centre, half in pile.boxes:
-            self.scene.add_entity(gs.morphs.Box(pos=centre, size=tuple(2 * np.array(half)), fixed=True), material=material)
+        for point, normal in pile.planes():
+            self.scene.add_entity(gs.morphs.Plane(pos=point, normal=normal), material=material)
         self.bodies = [self.scene.add_entity(gs.morphs.Mesh(file=os.fspath(mesh), pos=tuple(translation), quat=tuple(rotations.quaternion(rotation)), convexify=False,
                                                             decimate=False, watertighten=0, align=False), material=material)
                        for rotation, translation in zip(pile.rotation, pile.translation)]

@@ -44,6 +44,11 @@ class Pile:
         self.half, self.highest = 0.5 * gap * side, middles[:, 2].max()  # of the floor between the walls; of the middles
         self.boxes = self._boxes()
 
+    def planes(self):
+        """Points and normals of the floor and the walls, for engines that have planes."""
+        walls = [((-sign * self.half * x, -sign * self.half * y, 0.0), (sign * x, sign * y, 0.0)) for sign in (-1.0, 1.0) for x, y in ((1.0, 0.0), (0.0, 1.0))]
+        return [((0.0, 0.0, 0.0), (0.0, 0.0, 1.0)), *walls]
+
     def _boxes(self):
         outer, middle = self.half + THICKNESS, self.half + THICKNESS / 2
         boxes = [((0, 0, -THICKNESS / 2), (outer, outer, THICKNESS / 2))]

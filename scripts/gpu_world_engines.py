@@ -169,7 +169,7 @@ class NewtonMuJoCo(Newton):
 
     def solver_of(self, newton):
         return newton.solvers.SolverMuJoCo(self.model, use_mujoco_contacts=False, solver="newton", integrator="implicitfast", cone="elliptic", iterations=15,
-                                           ls_iterations=100, impratio=1.0, nconmax=self.room, njmax=self.room)
+                                           ls_iterations=100, impratio=1.0, nconmax=self.room, njmax=self.room, njmax_nnz=12 * self.room)
 
 
 def numbers(values):

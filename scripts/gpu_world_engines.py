@@ -216,7 +216,7 @@ class MuJoCoWarp(OnWarp):
 
 
 class MuJoCoWarpSDF(MuJoCoWarp):
-    settings = "distance fields; steps of 1/480 s, Newton with at most 100 iterations, 40 points and 10 iterations a pair, solref 0.01, solimp 0.95 0.99 (its model cow.xml)"
+    settings = "distance fields; steps of 1/480 s, Newton with at most 100 iterations, 40 points and 10 iterations a pair, solref 0.01 (its model cow.xml)"
     geom, contact, per_body = "sdf", 'solref="0.01 1" solimp=".95 .99 .0001"', 80
 
 

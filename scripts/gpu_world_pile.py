@@ -84,7 +84,7 @@ class Judge:
         return f"{name}.bvh"
 
     def write(self, path, states):
-        """States, each the rotations and translations of some bodies, side by side as worlds of one scene; every world has boxes of its own. Returns the world of each instance."""
+        """Writes states, each the rotations and translations of some bodies, as worlds of one scene, each with boxes. Returns the world of each instance."""
         boxes, centres = len(self.pile.boxes), np.array([centre for centre, _ in self.pile.boxes], float)
         world = np.repeat(np.arange(len(states)), [boxes + len(translation) for _, translation in states])
         with h5py.File(path, "w") as file:

@@ -3,6 +3,7 @@
 
 #include "kernels/manifold/pair_patches.h"
 #include "kernels/manifold/shape.h"
+#include "kernels/random_scenes.h"
 #include "manifold_scene.h"
 
 #ifdef TANDEM_HAVE_LANES
@@ -41,19 +42,19 @@ void expect_same(const PatchesOfPair& x, const PatchesOfPair& y) {
   }
 }
 
-// Compares all pairs of a scene by every variant that this machine has. Returns how many patches there are.
-std::size_t compare_variants(ManifoldScene& scene) {
-  scene.find();
+// Compares all pairs of bodies by every variant that this machine has. Returns how many patches there are.
+std::size_t compare_variants(std::span<const AssetView> views, std::span<const Instance> posed,
+                             const ContactQuery& query) {
   std::vector<manifold::Shape> shapes;
-  for (const AssetView& view : scene.assets.views())
+  for (const AssetView& view : views)
     shapes.push_back(
         manifold::shape_of(view.level(), view.header->lower, view.header->upper, view.header->origin));
-  const std::span<const Contact> contacts = scene.query.rows();
+  const std::span<const Contact> contacts = query.rows();
   std::size_t patches = 0;
   for (std::size_t first = 0, end = 0; first < contacts.size(); first = end) {
     while (end < contacts.size() && contacts[end].pair == contacts[first].pair) ++end;
-    const ObjectPair pair = scene.query.pairs()[contacts[first].pair];
-    const Instance &a = scene.posed[pair.a], &b = scene.posed[pair.b];
+    const ObjectPair pair = query.pairs()[contacts[first].pair];
+    const Instance &a = posed[pair.a], &b = posed[pair.b];
     const manifold::BodyPair bodies = {{shapes[a.asset], a.pose}, {shapes[b.asset], b.pose}};
     const auto of_pair = contacts.subspan(first, end - first);
     const PatchesOfPair plain = patches_of(manifold::OneThread(), bodies, of_pair);
@@ -68,6 +69,11 @@ std::size_t compare_variants(ManifoldScene& scene) {
   return patches;
 }
 
+std::size_t compare_variants(ManifoldScene& scene) {
+  scene.find();
+  return compare_variants(scene.assets.views(), scene.posed, scene.query);
+}
+
 TEST(ManifoldLanes, EveryVariantGivesTheSameBytes) {
   std::size_t patches = 0;
   for (std::uint64_t seed = 1; seed <= 8; ++seed) {
@@ -80,6 +86,25 @@ TEST(ManifoldLanes, EveryVariantGivesTheSameBytes) {
     for (int i = 0; i < 40; ++i)
       scene.add_body(static_cast<std::uint32_t>(random.below(6)), any_motion(random, 1));
     patches += compare_variants(scene);
+  }
+  EXPECT_GT(patches, 500u);
+}
+
+// Soups of triangles among them, at any distance from the origin.
+TEST(ManifoldLanes, PatchesOfRandomScenesAreTheSameToo) {
+  const SampleAssets meshes = sample_meshes();
+  std::size_t patches = 0;
+  for (std::uint64_t seed = 0; seed < 10; ++seed) {
+    const RandomScene random = random_scene(meshes.views(), seed);
+    SCOPED_TRACE(testing::Message() << random.kind << ", seed " << seed);
+    for (const std::vector<Instance>& instances : random.steps) {
+      Scene scene;
+      ContactQuery query;
+      ASSERT_EQ(scene.set_assets(meshes.views()), Status::kOk);
+      ASSERT_EQ(scene.place(instances), Status::kOk);
+      ASSERT_EQ(query.find(scene), Status::kOk);
+      patches += compare_variants(meshes.views(), instances, query);
+    }
   }
   EXPECT_GT(patches, 500u);
 }

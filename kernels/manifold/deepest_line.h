@@ -191,6 +191,7 @@ template <typename Team>
 TANDEM_HD void DeepestLine<Team>::learn(int side, const Crossing& surface, HalfSpace& out) const {
   out.side = static_cast<std::uint16_t>(side);
   out.triangle = surface.triangle;
+  out.normal = {}, out.offset = 0;
   if (!surface.found()) return;
   const WorldTriangle triangle = bodies_[side].triangle(surface.triangle);
   const PatchFrame& frame = shared_.frame;

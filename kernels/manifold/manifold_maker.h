@@ -363,7 +363,7 @@ TANDEM_HD void ManifoldMaker<Team>::place_candidates(const RimFinder<Team>& find
                                                      ChoiceMemory& shared) const {
   const int rank = static_cast<int>(team_.rank()), size = static_cast<int>(team_.size());
   const double deepest = state_.deepest.depth();
-  for (int i = rank; i <= 2 * state_.rim_points; i += size) {
+  for (int i = rank; i <= state_.rim_points + state_.ridges(); i += size) {
     Chosen& c = shared.candidate[i];
     if (i >= state_.rim_points) {
       const int next = i - state_.rim_points;  // 0 is the deepest line
@@ -456,7 +456,7 @@ TANDEM_HD void ManifoldMaker<Team>::keep_apart(int most_of_rim, ChoiceMemory& sh
       insert(i);
     }
     if (has_deepest) insert(state_.rim_points);
-    for (int i = 0; i < state_.rim_points; ++i) {
+    for (int i = 0; i < state_.ridges(); ++i) {
       if (state_.ridge[i].found()) insert(state_.rim_points + 1 + i);
     }
   }

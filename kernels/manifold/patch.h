@@ -226,12 +226,16 @@ inline constexpr int kMostRimPoints = static_cast<int>(kMostManifoldPoints);
 inline constexpr int kMostSheets = kMostRimPoints - 1 + kMostSeeds;
 static_assert(2 * kMostSheets <= LineMemory::kMost);
 
+/// The most points of a rim between which ridges are looked for (patch_ridges.h): with more corners it takes
+/// all points that a manifold may have.
+inline constexpr int kMostRidged = 5;
+
 /// The state of a patch from one step to the next.
 struct PatchState {
   Sounding sounding[kMostRimPoints];
-  OverlapLine ridge[kMostRimPoints - 1];  ///< between a point of the rim and the next, where it is deep
-  Sheet sheet[kMostSheets];               ///< of a bent patch
-  OverlapLine deepest;                    ///< none where the patch has no depth
+  OverlapLine ridge[kMostRidged];  ///< between a point of the rim and the next, where it is deep
+  Sheet sheet[kMostSheets];        ///< of a bent patch
+  OverlapLine deepest;             ///< none where the patch has no depth
   int rim_points, sheets;
   PatchKind kind;
   bool closed, goes_through;
@@ -246,6 +250,9 @@ struct PatchState {
   double reach;            ///< of the rim, from its centre
   std::uint64_t key;
   std::uint32_t candidates;
+
+  /// How many of `ridge` may be found.
+  TANDEM_HD int ridges() const { return rim_points <= kMostRidged ? rim_points : 0; }
 };
 
 /// Where the overlap of a patch is to be measured: along its normal, or along many directions if it is deep.
@@ -284,7 +291,7 @@ struct OutlineMemory {
 
 /// The most points of which a manifold's are chosen.
 inline constexpr int kMostCandidates = 2 * kMostRimPoints;
-static_assert(kMostCandidates >= kMostRimPoints + 1 + kMostSeeds);
+static_assert(kMostCandidates >= kMostRimPoints + 1 + kMostSeeds && kMostCandidates >= 2 * kMostRidged + 1);
 
 /// The memory that a team shares while it chooses a patch's points.
 struct ChoiceMemory {

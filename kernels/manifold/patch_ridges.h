@@ -14,9 +14,6 @@ inline constexpr double kRidge = 0.6;
 /// A point of the rim is shallow if the overlap there is less than this part of that at the ridge.
 inline constexpr double kShallow = 0.5;
 
-/// A rim of more corners takes all points that a manifold may have.
-inline constexpr int kMostRidged = 5;
-
 /// A line at a ridge runs beside it, by this part of the way between the points of the rim: on the ridge both
 /// triangles have it, and rounding decides.
 inline constexpr double kOffRidge = 0x1p-10;
@@ -95,9 +92,7 @@ TANDEM_HD bool RidgeFinder<Team>::guess(int i, Guess& out) const {
 
 template <typename Team>
 TANDEM_HD void RidgeFinder<Team>::find(LineMemory& lines) const {
-  if (state_.kind != PatchKind::overlap || state_.bent || state_.rim_points < 3 ||
-      state_.rim_points > kMostRidged)
-    return;
+  if (state_.kind != PatchKind::overlap || state_.bent || state_.ridges() < 3) return;
   const LineQuestions questions(bodies_, lines.line);
   bool asks = false;
   for (int i = static_cast<int>(team_.rank()); i < state_.rim_points; i += static_cast<int>(team_.size())) {

@@ -72,8 +72,8 @@ class BenchGpu(BenchTest):
 
     def test_deformed_bodies_on_the_gpu_have_the_contacts_of_rebuilt_trees(self):
         self.need_gpu()
-        for kind in ("twist", "collapse"):
-            scene = self.bend("cow_1500", kind)
+        for kind, number in (("twist", np.float32), ("collapse", np.float32), ("wave", np.float64)):
+            scene = self.bend("cow_1500", kind, number=number)
             expected, told = (json.loads(self.passes("deform", scene, "--rebuild", "--repeat", "2", "--json", *words)) for words in ([], self.ON_GPU))
             self.assertEqual((told["backend"], told["threads"], told["worst_block_pairs"], told["peers"][0]["name"]), ("cuda", 0, None, "Tandem GPU"))
             counts = [[frame["contacts"] for frame in report["peers"][0]["each_frame"]] for report in (expected, told)]
@@ -81,7 +81,6 @@ class BenchGpu(BenchTest):
             self.assertTrue(all(frame["update_nanoseconds"] > 0 and frame["query_seconds"] > 0 for frame in told["peers"][0]["each_frame"]))
             if kind == "twist":
                 self.assertGreater(len(set(counts[0])), 2)
-        self.assert_fails(self.bench("deform", self.bend("cow_1500", "wave", number=np.float64), *self.ON_GPU), UNREADABLE_INPUT, "float32")
 
     def test_options_of_another_backend_or_engine_are_refused(self):
         if not self.built:
@@ -139,7 +138,9 @@ class BenchGpu(BenchTest):
         part.rename(f"{part}.part")
         self.simulate("--frames", "120", "--resume", *self.ON_GPU, out=part)
         expected, found = self.contents(whole), self.contents(part)
-        self.assertEqual([name for name in expected if expected[name] != found[name]], [])
+        # How many pairs are known to be apart depends on how far the last searches looked.
+        names = [name for name in expected if not name.startswith("state/apart/")]
+        self.assertEqual([name for name in names if expected[name] != found[name]], [])
         self.assertGreater(len(expected["state/contacts/depth"]), 100)
 
     def need_gpu(self):

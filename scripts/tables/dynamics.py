@@ -1,4 +1,4 @@
-"""The table of what scripts/dynamics_peers measured."""
+"""Tables of what scripts/dynamics_peers and scripts/gpu_world_peers measured."""
 from common.tabular import markdown
 
 ENGINES = {"tandem": "Tandem", "box3d": "Box3D", "jolt": "Jolt", "mujoco": "MuJoCo", "mujoco, stiff": "MuJoCo, stiff", "pybullet": "PyBullet"}
@@ -9,6 +9,8 @@ SCENES = {("tower30", "jittered"): ("tower of 30", "largest drift"), ("masses", 
           ("arch", "15 wedges"): ("arch of 15 wedges", "largest drift"), ("dominoes", "50"): ("50 dominoes, fallen", "drift of the last second"),
           ("heap", "300 convex"): ("heap of 300 convex bodies", "drift of the last second")}
 FALLEN = 0.5  # metres
+GPU_ENGINES = {"tandem": "Tandem", "tandem, sleeping": "Tandem, sleeping", "newton, xpbd": "Newton, XPBD", "newton, mujoco": "Newton, MuJoCo's solver",
+               "mujoco warp": "MuJoCo Warp, hulls", "mujoco warp, sdf": "MuJoCo Warp, fields", "genesis": "Genesis"}
 
 
 def peers(rows):
@@ -30,3 +32,15 @@ def _cell(row):
 
 def _two_digits(value):
     return f"{float(f'{value:.2g}'):,g}"
+
+
+def gpu_pile(rows):
+    """Milliseconds of 1/60 s by phase, millimetres of penetration and rest, by number of bodies and engine."""
+    header = ["bodies", "engine", "falling", "piling", "rest", "deepest, mm", "mean, mm", "deepest of the run, mm", "fastest, m/s", "lost", "at rest"]
+    columns = ["falling_ms", "piling_ms", "rest_ms", "deepest_mm", "mean_depth_mm", "deepest_of_run_mm", "fastest_m_s"]
+    order = {name: i for i, name in enumerate(GPU_ENGINES)}
+    lines = []
+    for row in sorted(rows, key=lambda row: (int(row["bodies"]), order[row["engine"]])):
+        figures = [_two_digits(float(row[name])) if row[name] else "–" for name in columns]
+        lines.append([f"{int(row['bodies']):,}", GPU_ENGINES[row["engine"]], *figures, row["lost"] or "–", row["at_rest"] or f"ended at {row['simulated_s']} s"])
+    return markdown(header, lines, "rl")

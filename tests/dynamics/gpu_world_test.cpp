@@ -53,8 +53,9 @@ double difference(const BodyState& p, const BodyState& q) {
 }
 
 // Sines are rounded otherwise, nearest points are others within the tolerance of distances, a twentieth of
-// the slop, and sums of Newton's method have another order; what bodies do multiplies that. In the sixth step
-// a body meets another one in a tie: a shift by 1e-12 m changes its speed by 2 cm/s on a CPU too.
+// the slop, and sums of Newton's method have another order; what bodies do multiplies that, until an island
+// converges on one side alone. In the sixth step one does: a shift by 1e-12 m changes a speed by 2 cm/s on a
+// CPU too.
 TEST(GpuWorlds, MoveBodiesAsASimulationDoes) {
   NEEDS_GPU();
   const FallingBodies bodies(24);

@@ -134,9 +134,14 @@ class ConvexContacts {
   // more factorisations than are left in `factorisations`, which this counts down.
   TANDEM_HD bool minimise(const ConvexGoal& goal, std::span<Vector6> y, const IslandImpulses& impulse,
                           std::uint32_t& factorisations) {
-    while (true) {
+    constexpr double kFlat = 3e-9;
+    // Near the minimum the gradient falls by far more than a half each time, unless rounding is what is left.
+    constexpr double kNearlyFlat = 1e-7, kFalls = 0.5;
+    for (double before = INFINITY;;) {
       find_gradient(goal, y, impulse);
-      if (is_flat(goal, y)) return true;
+      const double slope = slope_of(goal, y, kFlat);
+      if (slope <= kFlat || (slope <= kNearlyFlat && slope > kFalls * before)) return true;
+      before = slope;
       if (factorisations == 0) return false;
       --factorisations;
       find_curvature(goal);
@@ -160,18 +165,17 @@ class ConvexContacts {
 
   TANDEM_HD std::uint32_t moved_count() const { return island_.body_count() - 1; }
 
-  // Returns whether the gradient is zero but for rounding.
-  TANDEM_HD bool is_flat(const ConvexGoal& goal, std::span<const Vector6> y) const {
-    constexpr double kFlat = 3e-9;
+  // Returns the gradient's length as a part of what velocities change by. flat: the part that counts as none.
+  TANDEM_HD double slope_of(const ConvexGoal& goal, std::span<const Vector6> y, double flat) const {
     double rounded = 0;
-    if constexpr (Joints::kAny) rounded = joints_.rounded(y, kFlat);
+    if constexpr (Joints::kAny) rounded = joints_.rounded(y, flat);
     const Sums<2> squares =
         team_.sum(Sums<2>{{0, rounded}}, moved_count(), [&](std::uint32_t k, Sums<2>& sums) {
           const std::uint32_t j = k + 1;
           sums.of[0] += square(with_.gradient[j]);
           sums.of[1] += square(y[j] - goal.free[j]) + 1e-6 * square(goal.free[j]);
         });
-    return std::sqrt(squares.of[0]) <= kFlat * std::sqrt(squares.of[1]);
+    return squares.of[0] > 0 ? std::sqrt(squares.of[0] / squares.of[1]) : 0;
   }
 
   TANDEM_HD void find_gradient(const ConvexGoal& goal, std::span<const Vector6> y,

@@ -18,8 +18,7 @@ TEST(World, AShiftTooSmallToMatterDoesNotMatter) {
       ASSERT_EQ(world.set_assets(bodies.assets.views()), Status::kOk);
       ASSERT_EQ(world.set_bodies(bodies.descriptions), Status::kOk);
       for (std::size_t i = 1; i < bodies.descriptions.size(); ++i) {
-        for (double& x : bodies.descriptions[i].pose.translation)
-          x += 1e-10 * static_cast<double>(i % 5);
+        for (double& x : bodies.descriptions[i].pose.translation) x += 1e-10 * static_cast<double>(i % 5);
       }
       ASSERT_EQ(world.step(1.0 / 60, 20), Status::kOk);
     }

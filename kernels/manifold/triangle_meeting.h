@@ -36,8 +36,8 @@ struct Meeting {
   Vector3 end[2];           ///< of a segment, run along as normal_a x normal_b points; of a point, twice
   TriangleFeature feature[2] = {};
 
-  /// Of the two ways of moving b by less than anything that there is, those in which the triangles do not
-  /// meet any more: each takes half of the segment's weight.
+  /// How many of two moves of b, there and back by less than anything that there is, part the triangles. Each
+  /// takes half of the segment's weight.
   std::uint8_t parted = 0;
 
   // These describe a polygon: the triangles lie in one plane.

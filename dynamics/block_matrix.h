@@ -85,31 +85,61 @@ TANDEM_HD inline void subtract_product(Matrix6& m, std::uint32_t row, const Matr
   for (int j = 0; j < 6; ++j) m.at[row][j] = own[j];
 }
 
-/// m becomes its lower triangle L with L L^T = m. False: it is not positive definite, to rounding.
-TANDEM_HD inline bool factorise_block(Matrix6& m) {
-  for (int j = 0; j < 6; ++j) {
-    double rest = m.at[j][j];
-    for (int k = 0; k < j; ++k) rest -= m.at[j][k] * m.at[j][k];
-    if (!(rest > 0)) return false;
-    m.at[j][j] = std::sqrt(rest);
-    for (int i = j + 1; i < 6; ++i) {
-      double value = m.at[i][j];
-      for (int k = 0; k < j; ++k) value -= m.at[i][k] * m.at[j][k];
-      m.at[i][j] = value / m.at[j][j];
-    }
-  }
-  return true;
+/// Returns 1 / sqrt(x).
+TANDEM_HD inline double inverse_root(double x) {
+#ifdef __CUDA_ARCH__
+  return rsqrt(x);
+#else
+  return 1 / std::sqrt(x);
+#endif
 }
 
-/// A row x becomes x L^-T, so as a column it becomes L^-1 x.
-TANDEM_HD inline void divide_by_transposed(double* x, const Matrix6& lower) {
-  double own[6];
-  for (int j = 0; j < 6; ++j) {
-    own[j] = x[j];
-    for (int k = 0; k < j; ++k) own[j] -= own[k] * lower.at[j][k];
-    own[j] /= lower.at[j][j];
+/// The lower triangle L of a block L L^T, with the inverse of each number on its diagonal: a division takes a
+/// GPU as long as thirty products.
+struct Factor6 {
+  double at[6][6];
+  bool exists;  ///< the block is positive definite, to rounding
+
+  TANDEM_HD explicit Factor6(const Matrix6& m) : exists(true) {
+    for (int j = 0; j < 6; ++j) {
+      double rest = m.at[j][j];
+      for (int k = 0; k < j; ++k) rest -= at[j][k] * at[j][k];
+      exists = exists && rest > 0;
+      at[j][j] = inverse_root(rest);
+      for (int i = j + 1; i < 6; ++i) {
+        double value = m.at[i][j];
+        for (int k = 0; k < j; ++k) value -= at[i][k] * at[j][k];
+        at[i][j] = value * at[j][j];
+      }
+    }
   }
-  for (int j = 0; j < 6; ++j) x[j] = own[j];
+
+  TANDEM_HD void write(Matrix6& to) const {
+    for (int i = 0; i < 6; ++i) {
+      for (int j = 0; j <= i; ++j) to.at[i][j] = at[i][j];
+    }
+  }
+  /// A row x becomes x L^-T, so as a column it becomes L^-1 x.
+  TANDEM_HD void divide_by_transposed(double* x) const {
+    double own[6];
+    for (int j = 0; j < 6; ++j) {
+      own[j] = x[j];
+      for (int k = 0; k < j; ++k) own[j] -= own[k] * at[j][k];
+      own[j] *= at[j][j];
+    }
+    for (int j = 0; j < 6; ++j) x[j] = own[j];
+  }
+};
+
+/// x becomes L^-T x. lower: what a Factor6 has written.
+TANDEM_HD inline void divide_by_factor(const Matrix6& lower, double* x) {
+  double own[6];
+  for (int i = 6; i-- > 0;) {
+    own[i] = x[i];
+    for (int k = i + 1; k < 6; ++k) own[i] -= lower.at[k][i] * own[k];
+    own[i] *= lower.at[i][i];
+  }
+  for (int i = 0; i < 6; ++i) x[i] = own[i];
 }
 
 /// A sparse symmetric matrix of 6 x 6 blocks: one for each body of an island and one for each two that touch
@@ -156,9 +186,11 @@ struct BlockMatrix {
   TANDEM_HD bool solve(const Team& team, std::span<Vector6> x) const {
     if (!factorise(team, x)) return false;
     for (std::uint32_t j = body_count(); j-- > 0;) {
-      if (team.rank() == 0) substitute_back(x, j);
+      team.each(kPartsOfBlock<Team>, [&](std::uint32_t part) { subtract_columns<Team>(x, j, part); });
+      team.barrier();
+      if (team.rank() == 0) divide_by_factor(diagonal[j], numbers_of(x[j]));
+      team.barrier();
     }
-    team.barrier();
     return true;
   }
 
@@ -168,19 +200,17 @@ struct BlockMatrix {
   TANDEM_HD bool factorise(const Team& team, std::span<Vector6> x) const {
     constexpr std::uint32_t kParts = kPartsOfBlock<Team>;
     for (std::uint32_t j = 0; j < body_count(); ++j) {
-      // Factors have a diagonal that is more than 0, so 0 says that there are none.
-      Matrix6& own = diagonal[j];
-      if (team.rank() == 0 && !factorise_block(own)) own.at[0][0] = 0;
-      team.barrier();
-      if (!(own.at[0][0] > 0)) return false;
+      const Factor6 own(diagonal[j]);  // each thread has one, which is faster than to wait for another's
+      if (!own.exists) return false;
       const std::uint32_t first = begin[j], count = begin[j + 1] - first;
       team.each(count * kParts + 1, [&](std::uint32_t i) {
-        if (i == count * kParts) return divide_by_transposed(numbers_of(x[j]), own);
+        if (i == count * kParts) return own.divide_by_transposed(numbers_of(x[j]));
         for_rows_of_part<Team>(i % kParts, [&](std::uint32_t row) {
-          divide_by_transposed(blocks[first + i / kParts].at[row], own);
+          own.divide_by_transposed(blocks[first + i / kParts].at[row]);
         });
       });
       team.barrier();
+      if (team.rank() == 0) own.write(diagonal[j]);
       each_of_triangle(team, count, kParts, [&](std::uint32_t high, std::uint32_t low, std::uint32_t part) {
         const std::uint32_t column = rows[first + low];
         Matrix6& to = low == high ? diagonal[column] : beside(column, rows[first + high]);
@@ -202,20 +232,20 @@ struct BlockMatrix {
     return true;
   }
 
-  TANDEM_HD void substitute_back(std::span<Vector6> x, std::uint32_t j) const {
-    double own[6];
-    for (int i = 0; i < 6; ++i) own[i] = numbers_of(x[j])[i];
+  // Subtracts from a part of x[j] what those further on, which are known, make of its column.
+  template <typename Team>
+  TANDEM_HD void subtract_columns(std::span<Vector6> x, std::uint32_t j, std::uint32_t part) const {
+    constexpr std::uint32_t kRows = BlockPart<Team>::kRows;
+    double* const to = numbers_of(x[j]) + part * kRows;
+    double own[kRows];
+    for (std::uint32_t k = 0; k < kRows; ++k) own[k] = to[k];
     for (std::uint32_t p = begin[j]; p < begin[j + 1]; ++p) {
       const double* const other = numbers_of(x[rows[p]]);
       for (int i = 0; i < 6; ++i) {
-        for (int k = 0; k < 6; ++k) own[k] -= blocks[p].at[i][k] * other[i];
+        for (std::uint32_t k = 0; k < kRows; ++k) own[k] -= blocks[p].at[i][part * kRows + k] * other[i];
       }
     }
-    for (int i = 6; i-- > 0;) {
-      for (int k = i + 1; k < 6; ++k) own[i] -= diagonal[j].at[k][i] * own[k];
-      own[i] /= diagonal[j].at[i][i];
-    }
-    for (int i = 0; i < 6; ++i) numbers_of(x[j])[i] = own[i];
+    for (std::uint32_t k = 0; k < kRows; ++k) to[k] = own[k];
   }
 };
 

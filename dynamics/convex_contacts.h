@@ -65,7 +65,7 @@ struct ContactSlope {
 /// What ConvexContacts works with.
 struct ConvexScratch {
   BlockMatrix matrix;
-  std::span<double> normal_softness, friction_softness, turning_softness;
+  std::span<double> normal_stiffness, friction_stiffness, turning_stiffness;  // 1/R
   std::span<Vector6> gradient;
   std::span<Vector6> way;                     // of a Newton step
   std::span<Vector3> relative, relative_way;  // velocities of contacts, and how the way changes them
@@ -78,8 +78,8 @@ struct ConvexScratch {
     const std::size_t bodies = island.bodies.size(), contacts = island.contacts.size(),
                       pairs = island.pairs.size();
     matrix.carve(carver, bodies - 1, block_count);
-    carver.take(contacts, normal_softness), carver.take(contacts, friction_softness);
-    carver.take(pairs, turning_softness), carver.take(bodies, gradient), carver.take(bodies, way);
+    carver.take(contacts, normal_stiffness), carver.take(contacts, friction_stiffness);
+    carver.take(pairs, turning_stiffness), carver.take(bodies, gradient), carver.take(bodies, way);
     carver.take(contacts, relative), carver.take(contacts, relative_way);
     carver.take(pairs, turning), carver.take(pairs, turning_way);
     carver.take(contacts, slope), carver.take(pairs, turning_slope), carver.take(pairs, block_of_pair);
@@ -122,11 +122,12 @@ class ConvexContacts {
   TANDEM_HD void set_softness(double softness) {
     if constexpr (Joints::kAny) joints_.set_softness();
     team_.each(island_.contact_count(), [&](std::uint32_t i) {
-      with_.normal_softness[i] = softness * island_.normal[i].mobility();
-      with_.friction_softness[i] = softness * island_.friction_mobility(i);
+      with_.normal_stiffness[i] = 1 / (softness * island_.normal[i].mobility());
+      with_.friction_stiffness[i] = 1 / (softness * island_.friction_mobility(i));
     });
-    team_.each(island_.pair_count(),
-               [&](std::uint32_t i) { with_.turning_softness[i] = softness * island_.pairs[i].mobility; });
+    team_.each(island_.pair_count(), [&](std::uint32_t i) {
+      with_.turning_stiffness[i] = 1 / (softness * island_.pairs[i].mobility);
+    });
     team_.barrier();
   }
 
@@ -156,9 +157,11 @@ class ConvexContacts {
   // Returns what velocities miss of y* and the impulses, after minimise().
   TANDEM_HD std::span<const Vector6> gradient() const { return with_.gradient; }
 
-  TANDEM_HD double normal_softness(std::size_t contact) const { return with_.normal_softness[contact]; }
-  TANDEM_HD double friction_softness(std::size_t contact) const { return with_.friction_softness[contact]; }
-  TANDEM_HD double turning_softness(std::size_t pair) const { return with_.turning_softness[pair]; }
+  TANDEM_HD double normal_softness(std::size_t contact) const { return 1 / with_.normal_stiffness[contact]; }
+  TANDEM_HD double friction_softness(std::size_t contact) const {
+    return 1 / with_.friction_stiffness[contact];
+  }
+  TANDEM_HD double turning_softness(std::size_t pair) const { return 1 / with_.turning_stiffness[pair]; }
 
  private:
   static constexpr std::uint32_t kParts = kPartsOfBlock<Team>;
@@ -364,11 +367,11 @@ class ConvexContacts {
   }
 
   TANDEM_HD Vector2 wanted_friction(const ConvexGoal& goal, std::size_t i, const Vector3& w) const {
-    return across(goal.impulse.contact[i]) - (1 / with_.friction_softness[i]) * across(w);
+    return across(goal.impulse.contact[i]) - with_.friction_stiffness[i] * across(w);
   }
 
   TANDEM_HD Vector3 wanted_turning(const ConvexGoal& goal, std::size_t i, const Vector3& w) const {
-    return goal.impulse.turning[i] - w / with_.turning_softness[i];
+    return goal.impulse.turning[i] - with_.turning_stiffness[i] * w;
   }
 
   TANDEM_HD Vector3 turning_at(const ConvexGoal& goal, std::size_t i, const Vector3& w) const {
@@ -379,12 +382,12 @@ class ConvexContacts {
   TANDEM_HD Vector3 turning_slope(const ConvexGoal& goal, std::size_t i, const Vector3& w,
                                   const Vector3& change) const {
     return shortened_change<Vector3>(wanted_turning(goal, i, w), goal.turning_bound[i],
-                                     change / with_.turning_softness[i]);
+                                     with_.turning_stiffness[i] * change);
   }
 
   TANDEM_HD Vector3 impulse_at(const ConvexGoal& goal, std::size_t i, const Vector3& w) const {
     const double normal =
-        std::max(0.0, goal.impulse.contact[i].x + (goal.target[i] - w.x) / with_.normal_softness[i]);
+        std::max(0.0, goal.impulse.contact[i].x + with_.normal_stiffness[i] * (goal.target[i] - w.x));
     const Vector2 friction = shortened(wanted_friction(goal, i, w), goal.bound[i]);
     return {normal, friction.x, friction.y};
   }
@@ -392,10 +395,10 @@ class ConvexContacts {
   // The derivative of the impulse along a change of w, less its sign.
   TANDEM_HD Vector3 impulse_slope(const ConvexGoal& goal, std::size_t i, const Vector3& w,
                                   const Vector3& change) const {
-    const bool pushes = goal.impulse.contact[i].x + (goal.target[i] - w.x) / with_.normal_softness[i] > 0;
+    const bool pushes = goal.impulse.contact[i].x + with_.normal_stiffness[i] * (goal.target[i] - w.x) > 0;
     const Vector2 slope = shortened_change<Vector2>(wanted_friction(goal, i, w), goal.bound[i],
-                                                    (1 / with_.friction_softness[i]) * across(change));
-    return {pushes ? change.x / with_.normal_softness[i] : 0, slope.x, slope.y};
+                                                    with_.friction_stiffness[i] * across(change));
+    return {pushes ? with_.normal_stiffness[i] * change.x : 0, slope.x, slope.y};
   }
 
   const Team& team_;

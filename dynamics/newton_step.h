@@ -73,10 +73,13 @@ class NewtonStep {
     constexpr int kMostPasses = 30;
     constexpr double kOfJoints = 1e-3;  // times what velocities of contacts may still change, those of joints
     constexpr double kHelps = 0.5, kStuck = 30;
+    constexpr double kNearer = 0.9;
+    constexpr int kNoHelp = 10;  // passes, none of which came nearer
     contacts_.set_softness(kSoftness);
     set_goal_of_velocities();
     const double solved = least_change();
-    double joints_before = INFINITY, contacts_before = INFINITY;
+    double joints_before = INFINITY, contacts_before = INFINITY, least = INFINITY;
+    int least_pass = 0;
     for (int pass = 0; pass < kMostPasses; ++pass) {
       if (!contacts_.minimise(with_.goal, with_.end, with_.impulse, left_)) return false;
       const double contacts = next_change();
@@ -93,6 +96,10 @@ class NewtonStep {
         balance();
         return true;
       }
+      if (contacts < kNearer * least)
+        least = contacts, least_pass = pass;
+      else if (pass - least_pass >= kNoHelp && contacts > kStuck * solved)
+        return false;
       take_impulses();
       contacts_before = contacts;
     }

@@ -60,4 +60,40 @@ class BlockTeam {
   Shared& shared_;
 };
 
+/// The threads of a warp as a team.
+class WarpTeam {
+ public:
+  static constexpr bool kIsMany = true;
+  static constexpr std::uint32_t kSize = 32;
+
+  __device__ std::uint32_t rank() const { return threadIdx.x % kSize; }
+  __device__ std::uint32_t size() const { return kSize; }
+  __device__ void barrier() const { __syncwarp(); }
+  template <typename Visit>
+  __device__ void each(std::uint32_t count, const Visit& visit) const {
+    for (std::uint32_t i = rank(); i < count; i += kSize) visit(i);
+  }
+  template <int kCount, typename Add>
+  __device__ Sums<kCount> sum(Sums<kCount> start, std::uint32_t count, const Add& add) const {
+    Sums<kCount> own = {};
+    for (std::uint32_t i = rank(); i < count; i += kSize) add(i, own);
+    for (int k = 0; k < kCount; ++k)
+      start.of[k] += of_all(own.of[k], [](double p, double q) { return p + q; });
+    return start;
+  }
+  template <typename Of>
+  __device__ double most(double start, std::uint32_t count, const Of& of) const {
+    for (std::uint32_t i = rank(); i < count; i += kSize) start = std::max(start, of(i));
+    return of_all(start, [](double p, double q) { return std::max(p, q); });
+  }
+
+ private:
+  // Each step adds the same two numbers in both threads, so all get the same.
+  template <typename Join>
+  __device__ static double of_all(double own, const Join& join) {
+    for (int half = 16; half > 0; half /= 2) own = join(own, __shfl_xor_sync(0xFFFFFFFFu, own, half));
+    return own;
+  }
+};
+
 }  // namespace tandem::dynamics

@@ -56,17 +56,33 @@ __global__ void __launch_bounds__(128) visit_together(const __grid_constant__ Vi
   visit(Worker{threadIdx.x / 32 * gridDim.x + blockIdx.x, blockDim.x / 32 * gridDim.x, threadIdx.x % 32, 32});
 }
 
-/// A block is a team. Shared: has nothing to be constructed or destroyed.
+/// Large things are visited by blocks, then the others by warps, each by whoever is free. Shared: has nothing
+/// to be constructed or destroyed. taken: by blocks, by warps; 0 before.
 template <typename Shared, typename Visit>
 __global__ void __launch_bounds__(BlockTeam::kSize)
-    visit_by_teams(const __grid_constant__ Visit visit, const std::uint32_t* count, std::uint32_t most) {
+    visit_by_teams(const __grid_constant__ Visit visit, const std::uint32_t* count, std::uint32_t most,
+                   std::uint32_t* taken) {
   __shared__ BlockTeam::Shared of_team;
-  alignas(16) __shared__ unsigned char bytes[sizeof(Shared)];
-  const BlockTeam team(of_team);
+  __shared__ std::uint32_t of_block;
+  alignas(16) __shared__ unsigned char bytes[BlockTeam::kWarps][sizeof(Shared)];
+  const auto shared = [&](std::uint32_t warp) -> Shared& { return *reinterpret_cast<Shared*>(bytes[warp]); };
+  const BlockTeam block(of_team);
   const std::uint32_t below = *count < most ? *count : most;
-  for (std::uint32_t i = blockIdx.x; i < below; i += gridDim.x) {
-    visit(team, i, *reinterpret_cast<Shared*>(bytes));
+  for (;;) {
+    if (block.rank() == 0) of_block = atomicAdd(taken, 1u);
     __syncthreads();
+    const std::uint32_t i = of_block;
+    __syncthreads();
+    if (i >= below) break;
+    if (visit.is_large(i)) visit(block, i, shared(0));
+  }
+  const WarpTeam team;
+  for (;;) {
+    std::uint32_t i = team.rank() == 0 ? atomicAdd(taken + 1, 1u) : 0;
+    i = __shfl_sync(0xFFFFFFFFu, i, 0);
+    if (i >= below) break;
+    if (!visit.is_large(i)) visit(team, i, shared(threadIdx.x / WarpTeam::kSize));
+    __syncwarp();
   }
 }
 
@@ -212,12 +228,15 @@ class CudaExecutor {
     take(cudaLaunchKernelEx(&launch, visit_together<Visit>, visit));
   }
 
+  /// Condition: reserve(), for two at least.
   template <typename Shared, typename Visit>
   void by_teams(const std::uint32_t* count, std::uint32_t most, const Visit& visit) {
     const std::uint32_t blocks =
         std::min(most, blocks_at_once(visit_by_teams<Shared, Visit>, BlockTeam::kSize));
     if (blocks == 0) return;
-    visit_by_teams<Shared><<<blocks, BlockTeam::kSize, 0, stream_>>>(visit, count, most);
+    std::uint32_t* const taken = other_keys_.data();
+    take(cudaMemsetAsync(taken, 0, 2 * sizeof *taken, stream_));
+    visit_by_teams<Shared><<<blocks, BlockTeam::kSize, 0, stream_>>>(visit, count, most, taken);
     take(cudaGetLastError());
   }
 

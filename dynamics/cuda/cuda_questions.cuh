@@ -218,7 +218,7 @@ class CudaQuestions {
     QuestionNeeds needs = read_;
     const Status status = std::exchange(needs.status, Status::kOk);
     const std::uint64_t where = std::exchange(needs.where, 0);
-    const auto more = [](auto& number) { number += number / 4; };
+    const auto more = [](auto& number) { number += number / 2; };
     more(needs.near.pairs), more(needs.contacts.pairs), more(needs.contacts.contacts);
     more(needs.contacts.undecided), more(needs.manifolds.pairs), more(needs.manifolds.contacts);
     more(needs.manifolds.manifolds), more(needs.manifolds.points), more(needs.distances.pairs);

@@ -82,6 +82,14 @@ TANDEM_HD inline void atomic_or(std::uint32_t& of, std::uint32_t bits) {
 #endif
 }
 
+TANDEM_HD inline void atomic_or(std::uint64_t& of, std::uint64_t bits) {
+#ifdef __CUDA_ARCH__
+  atomicOr(reinterpret_cast<unsigned long long*>(&of), static_cast<unsigned long long>(bits));
+#else
+  std::atomic_ref<std::uint64_t>(of).fetch_or(bits);
+#endif
+}
+
 /// Writes `x` where `from` is. Returns what was there before.
 TANDEM_HD inline std::uint32_t atomic_exchange_if(std::uint32_t& of, std::uint32_t from, std::uint32_t x) {
 #ifdef __CUDA_ARCH__

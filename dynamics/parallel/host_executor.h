@@ -79,7 +79,8 @@ class HostExecutor {
     });
   }
 
-  /// Calls visit(team, i, shared) for each i below the count, by all threads of a team; see SerialTeam.
+  /// Calls visit(team, i, shared) for each i below the count, by all threads of a team; see SerialTeam. The
+  /// team may have more threads if visit.is_large(i).
   /// shared: a Shared that the team has for itself, of which nothing is known.
   template <typename Shared, typename Visit>
   void by_teams(const std::uint32_t* count, std::uint32_t most, const Visit& visit) {

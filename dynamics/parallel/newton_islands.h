@@ -1,5 +1,6 @@
 #pragma once
 #include <algorithm>
+#include <bit>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -17,6 +18,10 @@ namespace tandem::dynamics {
 /// An island that may be solved by Newton's method has at most so many bodies and pairs. Larger ones are
 /// solved as soft ones, and counted.
 inline constexpr std::uint32_t kMostNewtonBodies = 2048, kMostNewtonPairs = 8192;
+
+/// An island has the columns that elimination needs if it has at most so many bodies; those of others have
+/// all bodies up to the last one.
+inline constexpr std::uint32_t kMostSparseBodies = 64;
 
 /// What a step by Newton's method needs and has done.
 struct NewtonNeeds {
@@ -48,7 +53,9 @@ struct NewtonIslandsView {
   std::uint32_t *bodies_of, *pairs_of, *contacts_of;  // of the island whose first body it is
   std::uint32_t* island_of;                           // the same; kNone: it is not looked at
   std::uint32_t *layer, *place;                       // place: in its island, from 1
-  std::uint8_t* is_solved;
+  std::uint8_t *is_solved, *was_solved;               // was: when the step was solved before
+  std::uint8_t* changes;            // the island whose first body it is has changed since then
+  const std::uint8_t* has_changed;  // a body has; null: the step was not solved before
   // Islands have parts of these, with an element for each body. found: in any order; order: in that of the
   // island; reach: the last body that each has something to do with, as its place less 1.
   std::uint32_t *found_bodies, *order, *reach;
@@ -72,7 +79,7 @@ TANDEM_HD inline void begin_body(const NewtonIslandsView& view, std::uint32_t i)
   view.label[i] = i;
   view.bodies_of[i] = view.pairs_of[i] = view.contacts_of[i] = 0;
   view.layer[i] = view.island_of[i] = NewtonIslandsView::kNone;
-  view.is_solved[i] = 0;
+  view.was_solved[i] = view.is_solved[i], view.is_solved[i] = view.changes[i] = 0;
 }
 
 TANDEM_HD inline void join_pair(const NewtonIslandsView& view, std::uint32_t i) {
@@ -85,6 +92,7 @@ TANDEM_HD inline void join_pair(const NewtonIslandsView& view, std::uint32_t i) 
 TANDEM_HD inline void count_body(const NewtonIslandsView& view, std::uint32_t i) {
   const std::uint32_t root = first_of(view.label, i);
   view.label[i] = root;
+  if (view.has_changed != nullptr && view.has_changed[i] != 0) view.changes[root] = 1;
   add_up_to(view.bodies_of[root], kMostNewtonBodies + 1);
 }
 
@@ -102,10 +110,20 @@ TANDEM_HD inline void leave_joined(const NewtonIslandsView& view, const JointArr
   if (view.is_moved(i) && joints.hold(i)) atomic_least(view.pairs_of[view.label[i]], 0u);
 }
 
+// An island that has not changed is as it was: solved, or left to soft steps.
+TANDEM_HD inline void keep_body(const NewtonIslandsView& view, std::uint32_t i) {
+  if (view.changes[view.label[i]] == 0) view.is_solved[i] = view.was_solved[i];
+}
+TANDEM_HD inline void keep_pair(const NewtonIslandsView& view, std::uint32_t i) {
+  const std::uint32_t root = view.label_of(view.pairs.pairs[i]);
+  if (view.changes[root] == 0) view.is_pair_solved[i] = view.was_solved[root];
+}
+
 // Gives an island its parts of the lists. Where they are is chance, and changes nothing.
 TANDEM_HD inline void begin_island(const NewtonIslandsView& view, std::uint32_t i, bool takes_all) {
   const std::uint32_t bodies = view.bodies_of[i], pairs = view.pairs_of[i], contacts = view.contacts_of[i];
   if (view.label[i] != i || !view.is_moved(i)) return;
+  if (view.has_changed != nullptr && view.changes[i] == 0) return;
   if (bodies > kMostNewtonBodies || pairs > kMostNewtonPairs) {
     atomic_add(view.needs->too_large, 1);
     return;
@@ -153,6 +171,10 @@ void find_newton_islands(Executor& executor, const NewtonIslandsView& all, const
   executor.for_each(pairs.count, pairs.most, [=] TANDEM_HD(std::uint32_t i) { count_pair(view, i); });
   if (joints.count > 0)
     executor.for_each(nullptr, bodies, [=] TANDEM_HD(std::uint32_t i) { leave_joined(view, joints, i); });
+  if (view.has_changed != nullptr) {
+    executor.for_each(nullptr, bodies, [=] TANDEM_HD(std::uint32_t i) { keep_body(view, i); });
+    executor.for_each(pairs.count, pairs.most, [=] TANDEM_HD(std::uint32_t i) { keep_pair(view, i); });
+  }
   executor.for_each(nullptr, bodies, [=] TANDEM_HD(std::uint32_t i) { begin_island(view, i, takes_all); });
   executor.for_each(nullptr, bodies, [=] TANDEM_HD(std::uint32_t i) { list_body(view, i); });
   executor.for_each(pairs.count, pairs.most, [=] TANDEM_HD(std::uint32_t i) { list_pair(view, i); });
@@ -173,13 +195,29 @@ TANDEM_HD void rank_sort(const Team& team, const std::uint32_t* from, std::uint3
   team.barrier();
 }
 
+/// The rows of the columns of a small island's matrix, which a team shares. A bit of a column is a row.
+struct SparseColumns {
+  std::uint64_t rows_of[kMostSparseBodies];
+};
+
+/// Condition: bits != 0
+TANDEM_HD inline std::uint32_t lowest_bit(std::uint64_t bits) {
+#ifdef __CUDA_ARCH__
+  return static_cast<std::uint32_t>(__ffsll(static_cast<long long>(bits)) - 1);
+#else
+  return static_cast<std::uint32_t>(std::countr_zero(bits));
+#endif
+}
+
 /// A team that prepares an island.
 template <typename Team>
 class NewtonIslandPlan {
  public:
-  TANDEM_HD NewtonIslandPlan(const Team& team, const NewtonIslandsView& all, std::uint32_t island)
+  TANDEM_HD NewtonIslandPlan(const Team& team, const NewtonIslandsView& all, std::uint32_t island,
+                             SparseColumns& columns)
       : team_(team),
         all_(all),
+        columns_(columns),
         island_(all.islands[island]),
         bodies_(all.found_bodies + island_.first_body),
         pairs_(all.found_pairs + island_.first_pair) {}
@@ -236,14 +274,13 @@ class NewtonIslandPlan {
   /// Puts bodies into the order of their layers, and pairs into that of their lower bodies. Result: how many
   /// blocks beside the diagonal the island's matrix has.
   TANDEM_HD std::uint32_t put_in_order() const {
-    std::uint32_t* const reach = all_.reach + island_.first_body;
     const auto key = [](std::uint32_t layer, std::uint32_t number) {
       return std::uint64_t{layer} << 32 | number;
     };
     rank_sort(
         team_, bodies_, all_.order + island_.first_body, island_.bodies,
         [&](std::uint32_t body) { return key(all_.layer[body], body); },
-        [&](std::uint32_t body, std::uint32_t at) { all_.place[body] = at + 1, reach[at] = at; });
+        [&](std::uint32_t body, std::uint32_t at) { all_.place[body] = at + 1, begin_column(at); });
     rank_sort(
         team_, pairs_, all_.pair_order + island_.first_pair, island_.pairs,
         [&](std::uint32_t i) {
@@ -252,36 +289,73 @@ class NewtonIslandPlan {
         },
         [&](std::uint32_t i, std::uint32_t) {
           const std::uint32_t a = place_of(all_.pairs.pairs[i].a), b = place_of(all_.pairs.pairs[i].b);
-          if (a > 0 && b > 0) atomic_most(reach[std::min(a, b) - 1], std::max(a, b) - 1);
+          if (a > 0 && b > 0) add_to_column(std::min(a, b) - 1, std::max(a, b) - 1);
         });
-    // Eliminating a body joins all that it reaches: so each reaches as far as those before it.
-    if (team_.rank() == 0) {
-      for (std::uint32_t j = 1; j < island_.bodies; ++j) reach[j] = std::max(reach[j], reach[j - 1]);
-    }
+    if (team_.rank() == 0) eliminate();
     team_.barrier();
-    const Sums<1> blocks = team_.sum(Sums<1>{}, island_.bodies,
-                                     [&](std::uint32_t j, Sums<1>& sums) { sums.of[0] += reach[j] - j; });
+    const Sums<1> blocks = team_.sum(Sums<1>{}, island_.bodies, [&](std::uint32_t j, Sums<1>& sums) {
+      for_column(j, [&](std::uint32_t, std::uint32_t) { sums.of[0] += 1; });
+    });
     return static_cast<std::uint32_t>(blocks.of[0]);
   }
 
-  /// Writes the columns of the island's matrix, which have no gaps. Condition: put_in_order().
+  /// Writes the columns of the island's matrix. Condition: put_in_order().
   TANDEM_HD void write_columns(const BlockMatrix& matrix) const {
-    const std::uint32_t* const reach = all_.reach + island_.first_body;
     if (team_.rank() == 0) {
       matrix.begin[0] = 0;
-      for (std::uint32_t j = 0; j < island_.bodies; ++j)
-        matrix.begin[j + 1] = matrix.begin[j] + (reach[j] - j);
+      for (std::uint32_t j = 0; j < island_.bodies; ++j) {
+        std::uint32_t count = 0;
+        for_column(j, [&](std::uint32_t, std::uint32_t) { ++count; });
+        matrix.begin[j + 1] = matrix.begin[j] + count;
+      }
     }
     team_.barrier();
     team_.each(island_.bodies, [&](std::uint32_t j) {
-      for (std::uint32_t k = 0; k < reach[j] - j; ++k) matrix.rows[matrix.begin[j] + k] = j + 1 + k;
+      for_column(j, [&](std::uint32_t k, std::uint32_t row) { matrix.rows[matrix.begin[j] + k] = row; });
     });
     team_.barrier();
   }
 
  private:
+  TANDEM_HD bool is_sparse() const { return island_.bodies <= kMostSparseBodies; }
+  TANDEM_HD std::uint32_t& reach(std::uint32_t j) const { return all_.reach[island_.first_body + j]; }
+
+  TANDEM_HD void begin_column(std::uint32_t j) const {
+    if (is_sparse())
+      columns_.rows_of[j] = 0;
+    else
+      reach(j) = j;
+  }
+  TANDEM_HD void add_to_column(std::uint32_t j, std::uint32_t row) const {
+    if (is_sparse())
+      atomic_or(columns_.rows_of[j], std::uint64_t{1} << row);
+    else
+      atomic_most(reach(j), row);
+  }
+  // Eliminating a body joins all that its column has.
+  TANDEM_HD void eliminate() const {
+    for (std::uint32_t j = 0; j < island_.bodies; ++j) {
+      if (!is_sparse()) {
+        reach(j) = std::max(reach(j), reach(j > 0 ? j - 1 : 0));
+      } else if (const std::uint64_t rows = columns_.rows_of[j]; rows != 0) {
+        columns_.rows_of[lowest_bit(rows)] |= rows & (rows - 1);
+      }
+    }
+  }
+  // Calls visit(k, row) for each row of a column, the k-th, ascending.
+  template <typename Visit>
+  TANDEM_HD void for_column(std::uint32_t j, const Visit& visit) const {
+    if (!is_sparse()) {
+      for (std::uint32_t k = 0; k < reach(j) - j; ++k) visit(k, j + 1 + k);
+      return;
+    }
+    std::uint32_t k = 0;
+    for (std::uint64_t rows = columns_.rows_of[j]; rows != 0; rows &= rows - 1) visit(k++, lowest_bit(rows));
+  }
+
   const Team& team_;
   const NewtonIslandsView& all_;
+  SparseColumns& columns_;
   NewtonIsland island_;
   const std::uint32_t *bodies_, *pairs_;
 };

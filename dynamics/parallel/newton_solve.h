@@ -39,6 +39,7 @@ struct NewtonShared {
   NewtonScratch scratch;
   OwnBodies bodies;  // of a step in parts, as `part`
   PartContacts part;
+  SparseColumns columns;
   StepNumbers step;  // of the island, or of a part
   const ContactPoint* contacts;
   const ContactImpulse* impulses;
@@ -59,7 +60,7 @@ class NewtonIslandStep {
  public:
   TANDEM_HD NewtonIslandStep(const Team& team, const NewtonStepView& view, std::uint32_t island,
                              NewtonShared& shared)
-      : team_(team), view_(view), with_(shared), plan_(team, view.islands, island) {}
+      : team_(team), view_(view), with_(shared), plan_(team, view.islands, island, shared.columns) {}
 
   /// Solves the island if it is slender, has room, and converges.
   TANDEM_HD void solve() {

@@ -51,6 +51,7 @@ TANDEM_HD inline ContactPoint point_of(const ObjectPair& pair, const ManifoldPoi
 TANDEM_HD inline void place_body(const StepArrays& a, std::uint32_t i) {
   const BodyProperties& body = a.properties[i];
   a.pose[i] = pose_of(body, a.start[i]).pose;
+  a.has_missed[i] = 0;
   if (!is_usable(a.start[i]) || !is_rigid(a.pose[i])) {
     // Such a step is not made. Questions do not see the body, nor do pairs.
     atomic_least(a.counts->bad_start, i);
@@ -133,11 +134,18 @@ TANDEM_HD inline bool is_solved(const StepArrays& a, const PairRecord& record) {
   return record.contacts > 0 && (a.is_moved(record.pair.a) || a.is_moved(record.pair.b));
 }
 
-// Makes the contacts of a pair, behind those of the pairs before it.
-TANDEM_HD inline void remember_pair(const StepArrays& a, std::uint32_t at) {
+// Returns how many contacts a pair may remember.
+TANDEM_HD inline std::uint32_t most_remembered_of(const StepArrays& a, std::uint32_t at) {
+  const PairPlan& plan = a.plans[at];
+  const std::uint32_t old = plan.before != kNoIndex ? a.records_before[plan.before].count : 0;
+  return old + (plan.keeps || plan.is_idle ? 0 : plan.found);
+}
+
+// Makes the contacts of a pair, from the row `first` on.
+TANDEM_HD inline void remember_pair(const StepArrays& a, std::uint32_t at, std::uint32_t first) {
   PairRecord& record = a.records[at];
   const PairPlan& plan = a.plans[at];
-  record.first = record.first_contact = a.sums[at];
+  record.first = record.first_contact = first;
   record.count = record.contacts = 0;
   const std::span<const CachedContact> old = remembered_before(a, plan);
   const PairContacts to = {a.remembered + record.first, a.contacts + record.first, a.place + record.first};
@@ -218,8 +226,10 @@ TANDEM_HD inline void join_missed(const StepArrays& a, std::uint32_t at, std::sp
   for (ContactPoint point : at_end) {
     if (take_missed(a.ahead(), {a.end, a.bodies}, a.records[at].pair, point)) at_end[missed++] = point;
   }
+  plan.is_missed = missed > 0;
   if (missed == 0) return;
   atomic_add(a.counts->missed, 1);
+  for (const std::uint32_t body : {a.records[at].pair.a, a.records[at].pair.b}) a.has_missed[body] = 1;
   const std::uint32_t count = plan.keeps ? 0 : plan.found;
   plan.keeps = false;
   const std::uint32_t first = atomic_add(a.counts->found, count + missed);

@@ -44,8 +44,8 @@ struct PairStep {
     select([of] TANDEM_HD(std::uint32_t i) { return is_surprised(of, i); }, &of.counts->surprised);
   }
 
-  /// Adds the contacts at the end of the step to those of surprised pairs, and makes the contacts of the step
-  /// again, if counts.missed pairs have any.
+  /// Adds the contacts at the end of the step to those of surprised pairs, if counts.missed pairs have any.
+  /// The contacts of other pairs stay where they are.
   void add_missed() {
     using namespace pair_step_detail;
     const StepArrays of = a;
@@ -58,7 +58,7 @@ struct PairStep {
     to.once([of] TANDEM_HD() { of.counts->missed = 0; });
     to.for_each(&of.counts->surprised, a.most_moved,
                 [of] TANDEM_HD(std::uint32_t r) { join_missed(of, of.list[r], found_of(of, r)); });
-    remember_contacts();
+    remember_missed();
     list_touching();
   }
 
@@ -189,18 +189,33 @@ struct PairStep {
   void remember_contacts() {
     using namespace pair_step_detail;
     const StepArrays of = a;
-    to.for_each(&of.counts->pairs, a.most_pairs, [of] TANDEM_HD(std::uint32_t i) {
-      const PairPlan& plan = of.plans[i];
-      const std::uint32_t old = plan.before != kNoIndex ? of.records_before[plan.before].count : 0;
-      of.flags[i] = old + (plan.keeps || plan.is_idle ? 0 : plan.found);
-    });
+    to.for_each(&of.counts->pairs, a.most_pairs,
+                [of] TANDEM_HD(std::uint32_t i) { of.flags[i] = most_remembered_of(of, i); });
     to.sum_before(a.flags, &of.counts->pairs, a.most_pairs, a.sums);
     to.once([of] TANDEM_HD() { of.counts->remembered = of.sums[least_of(of.counts->pairs, of.most_pairs)]; });
     to.for_each(&of.counts->pairs, a.most_pairs, [of] TANDEM_HD(std::uint32_t i) {
       if (of.counts->remembered <= of.most_remembered && of.counts->found <= of.most_found)
-        remember_pair(of, i);
+        remember_pair(of, i, of.sums[i]);
       else
         of.records[i].count = of.records[i].contacts = 0;
+    });
+  }
+
+  // Contacts of pairs that missed some come behind all others.
+  void remember_missed() {
+    using namespace pair_step_detail;
+    const StepArrays of = a;
+    to.for_each(&of.counts->surprised, a.most_moved, [of] TANDEM_HD(std::uint32_t r) {
+      of.flags[r] = of.plans[of.list[r]].is_missed ? most_remembered_of(of, of.list[r]) : 0;
+    });
+    to.sum_before(a.flags, &of.counts->surprised, a.most_moved, a.sums);
+    to.for_each(&of.counts->surprised, a.most_moved, [of] TANDEM_HD(std::uint32_t r) {
+      const std::uint32_t first = of.counts->remembered + of.sums[r], end = first + of.flags[r];
+      if (of.plans[of.list[r]].is_missed && end <= of.most_remembered && of.counts->found <= of.most_found)
+        remember_pair(of, of.list[r], first);
+    });
+    to.once([of] TANDEM_HD() {
+      of.counts->remembered += of.sums[least_of(of.counts->surprised, of.most_moved)];
     });
   }
 

@@ -35,7 +35,7 @@ struct ParallelArrays {
   Array<BodyState> states[3];
   Array<Pull> pulls;
   Array<BodyForce> forces;
-  Array<std::uint8_t> placed, idle;
+  Array<std::uint8_t> placed, idle, has_missed;
   Array<std::uint32_t> asset, group, label, marks;
   Array<Pose> pose;
   Array<Motion> motion;
@@ -69,6 +69,7 @@ struct ParallelArrays {
     a.asset = asset.data(), a.pose = pose.data(), a.motion = motion.data();
     a.ways = ways.data(), a.ways_ahead = ways_ahead.data();
     a.quiet = quiet.data(), a.group = group.data(), a.label = label.data(), a.marks = marks.data();
+    a.has_missed = has_missed.data();
     a.inner_radius = inner_radius.data(), a.boxes = boxes.data();
     a.most_pairs = most_pairs;
     a.records_before = records[0].data(), a.records = records[1].data();
@@ -90,12 +91,12 @@ struct ParallelArrays {
   }
 
   std::size_t bytes() const {
-    return bytes_of(properties, acting, states[0], states[1], states[2], pulls, forces, placed, idle, asset,
-                    group, label, marks, pose, motion, ways, ways_ahead, quiet, inner_radius, boxes,
-                    records[0], records[1], touches[0], touches[1], begun[0], begun[1], plans, flags, sums,
-                    list, row_first, row_end, asked, moved_pairs, reach, moved_asset, moved_pose, approaches,
-                    touching, found, contacts, remembered[0], remembered[1], place, contact_marks,
-                    impulses_before, impulses, done, counts);
+    return bytes_of(properties, acting, states[0], states[1], states[2], pulls, forces, placed, idle,
+                    has_missed, asset, group, label, marks, pose, motion, ways, ways_ahead, quiet,
+                    inner_radius, boxes, records[0], records[1], touches[0], touches[1], begun[0], begun[1],
+                    plans, flags, sums, list, row_first, row_end, asked, moved_pairs, reach, moved_asset,
+                    moved_pose, approaches, touching, found, contacts, remembered[0], remembered[1], place,
+                    contact_marks, impulses_before, impulses, done, counts);
   }
 
   /// The results of a step become what the next one begins with.
@@ -109,15 +110,26 @@ struct ParallelArrays {
     std::vector<std::uint32_t> shapes;
     for (const BodyProperties& body : all.properties) shapes.push_back(body.shape);
     Status out = Status::kOk;
-    for (Status status :
-         {put<BodyProperties>(to, properties, all.properties),
-          put<BodyProperties>(to, acting, all.properties), put<BodyState>(to, states[0], all.states),
-          put<BodyState>(to, states[1], all.states), put<BodyState>(to, states[2], all.states),
-          put<std::uint32_t>(to, asset, shapes), put<double>(to, inner_radius, all.inner_radii),
-          put<AssetBox>(to, boxes, all.boxes), fill<std::uint8_t>(to, placed, 0), fill<double>(to, quiet, 0),
-          fill<std::uint32_t>(to, group, Sleep::kAwake), fill<std::uint8_t>(to, idle, 0),
-          pulls.reserve(bodies), pose.reserve(bodies), motion.reserve(bodies), ways.reserve(bodies),
-          ways_ahead.reserve(bodies), label.reserve(bodies), marks.reserve(bodies)}) {
+    for (Status status : {put<BodyProperties>(to, properties, all.properties),
+                          put<BodyProperties>(to, acting, all.properties),
+                          put<BodyState>(to, states[0], all.states),
+                          put<BodyState>(to, states[1], all.states),
+                          put<BodyState>(to, states[2], all.states),
+                          put<std::uint32_t>(to, asset, shapes),
+                          put<double>(to, inner_radius, all.inner_radii),
+                          put<AssetBox>(to, boxes, all.boxes),
+                          fill<std::uint8_t>(to, placed, 0),
+                          fill<double>(to, quiet, 0),
+                          fill<std::uint32_t>(to, group, Sleep::kAwake),
+                          fill<std::uint8_t>(to, idle, 0),
+                          pulls.reserve(bodies),
+                          pose.reserve(bodies),
+                          motion.reserve(bodies),
+                          ways.reserve(bodies),
+                          ways_ahead.reserve(bodies),
+                          label.reserve(bodies),
+                          marks.reserve(bodies),
+                          has_missed.reserve(bodies)}) {
       if (out == Status::kOk) out = status;
     }
     return out;

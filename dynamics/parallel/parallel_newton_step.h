@@ -10,6 +10,13 @@ namespace tandem::dynamics {
 
 struct SolveNewtonIslands {
   NewtonStepView view;
+
+  /// Returns whether an island is worth more threads than those of a warp.
+  TANDEM_HD bool is_large(std::uint32_t island) const {
+    constexpr std::uint32_t kMostBodies = 6, kMostContacts = 64;
+    const NewtonIsland& of = view.islands.islands[island];
+    return of.bodies > kMostBodies || of.contacts > kMostContacts;
+  }
   template <typename Team>
   TANDEM_HD void operator()(const Team& team, std::uint32_t island, NewtonShared& shared) const {
     NewtonIslandStep<Team>(team, view, island, shared).solve();
@@ -30,7 +37,8 @@ class ParallelNewtonStep {
       if (status == Status::kOk) status = of;
     };
     take(needs_.reserve(1)), take(numbers_.reserve(3));
-    take(of_bodies_.reserve(kOfBody * std::uint64_t{bodies_})), take(is_solved_.reserve(bodies_));
+    take(of_bodies_.reserve(kOfBody * std::uint64_t{bodies_}));
+    take(flags_of_bodies_.reserve(3 * std::uint64_t{bodies_}));
     take(islands_.reserve(bodies_));
     take(of_pairs_.reserve(kOfPair * std::uint64_t{pairs_})), take(is_pair_solved_.reserve(pairs_));
     take(soft_pairs_.reserve(pairs_));
@@ -43,10 +51,12 @@ class ParallelNewtonStep {
   const NewtonNeeds* needs() const { return needs_.data(); }
 
   /// Solves islands; the result is what is left to soft steps. Condition: there is room for all bodies and
-  /// for input.most_pairs pairs.
+  /// for input.most_pairs pairs. has_changed: if the step was solved before, which bodies have contacts since
+  /// then; islands without such bodies keep what that solution wrote.
   SoftStepInput step(Executor& executor, const SoftStepInput& input, const SolverOptions& options,
-                     const SoftStepOutput& output) {
-    const NewtonStepView view = view_of(input, options, output);
+                     const SoftStepOutput& output, const std::uint8_t* has_changed = nullptr) {
+    NewtonStepView view = view_of(input, options, output);
+    view.islands.has_changed = has_changed;
     find_newton_islands(executor, view.islands, input.joints, input.body_count, view.takes_all());
     executor.template by_teams<NewtonShared>(&view.islands.needs->islands, input.body_count,
                                              SolveNewtonIslands{view});
@@ -64,7 +74,7 @@ class ParallelNewtonStep {
   }
 
   std::size_t bytes() const {
-    return bytes_of(needs_, islands_, numbers_, of_bodies_, of_pairs_, is_solved_, is_pair_solved_,
+    return bytes_of(needs_, islands_, numbers_, of_bodies_, of_pairs_, flags_of_bodies_, is_pair_solved_,
                     soft_pairs_, memory_);
   }
 
@@ -86,7 +96,10 @@ class ParallelNewtonStep {
                                        of_body(4),
                                        of_body(5),
                                        of_body(6),
-                                       is_solved_.data(),
+                                       flags_of_bodies_.data(),
+                                       flags_of_bodies_.data() + bodies_,
+                                       flags_of_bodies_.data() + 2 * std::uint64_t{bodies_},
+                                       nullptr,
                                        of_body(7),
                                        of_body(8),
                                        of_body(9),
@@ -104,7 +117,7 @@ class ParallelNewtonStep {
   Array<NewtonNeeds> needs_;
   Array<NewtonIsland> islands_;
   Array<std::uint32_t> numbers_, of_bodies_, of_pairs_;
-  Array<std::uint8_t> is_solved_, is_pair_solved_;
+  Array<std::uint8_t> flags_of_bodies_, is_pair_solved_;
   Array<ContactPair> soft_pairs_;
   Array<std::byte> memory_;
 };

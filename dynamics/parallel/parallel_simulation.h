@@ -331,7 +331,7 @@ class ParallelSimulation {
       const Status missed = read(whole);
       if (missed != Status::kOk || !whole || read_.missed == 0) return missed;
       queue(kSolve, [&] {
-        solve(step.a);
+        solve(step.a, step.a.has_missed);
         step.find_surprised();
         queue_reading();
       });
@@ -353,7 +353,8 @@ class ParallelSimulation {
     return to_.copy(a.counts, std::span(&read_, 1));
   }
 
-  void solve(const StepArrays& a) {
+  // has_changed: see ParallelNewtonStep.
+  void solve(const StepArrays& a, const std::uint8_t* has_changed = nullptr) {
     const SoftStepOutput output = {a.end, a.impulses, a.done};
     SoftStepInput input = {a.acting,     a.start,
                            a.pulls,      a.bodies,
@@ -361,7 +362,7 @@ class ParallelSimulation {
                            a.touching,   &a.counts->touching,
                            a.most_pairs, a.dt,
                            a.joints};
-    if (has_newton()) input = newton_.step(to_, input, a.options, output);
+    if (has_newton()) input = newton_.step(to_, input, a.options, output, has_changed);
     solver_.step(to_, input, a.options, output);
   }
 
@@ -394,7 +395,7 @@ class ParallelSimulation {
     if (needed > within_) within_ = 1.5 * needed, grew = true;
     if (status == Status::kOk && read_.pairs > arrays_.most_pairs) {
       grew = true;
-      status = reserve_pairs(read_.pairs + read_.pairs / 4);
+      status = reserve_pairs(read_.pairs + read_.pairs / 2);
     }
     const std::uint32_t moved = std::max({read_.middle, read_.approaches, read_.surprised});
     if (status == Status::kOk && moved > arrays_.most_moved) {
@@ -404,7 +405,7 @@ class ParallelSimulation {
     if (status == Status::kOk &&
         (read_.found > arrays_.most_found || read_.remembered > arrays_.most_remembered)) {
       grew = true;
-      status = reserve_contacts(read_.found + read_.found / 4, read_.remembered + read_.remembered / 4);
+      status = reserve_contacts(read_.found + read_.found / 2, read_.remembered + read_.remembered / 2);
     }
     if (status == Status::kOk && !grew && solver_needs_.has_room == 0) {
       grew = true;
@@ -412,7 +413,7 @@ class ParallelSimulation {
     }
     if (status == Status::kOk && !grew && has_newton() && newton_needs_.has_room == 0) {
       grew = true;
-      const std::uint32_t units = newton_needs_.units + newton_needs_.units / 4;
+      const std::uint32_t units = newton_needs_.units + newton_needs_.units / 2;
       status = newton_.reserve(to_, arrays_.bodies, arrays_.most_pairs, units);
     }
     whole = !grew;

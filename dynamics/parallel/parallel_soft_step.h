@@ -61,7 +61,7 @@ inline SoftStepRoom usual_room(std::uint32_t bodies, std::uint32_t pairs, std::u
 /// Returns more room for a step that had too little: a quarter more than it needs.
 inline SoftStepRoom larger_room(const SoftStepRoom& room, const SoftStepNeeds& needs) {
   const auto larger = [](std::uint32_t has, std::uint32_t needed) {
-    return needed > has ? needed + needed / 4 : has;
+    return needed > has ? needed + needed / 2 : has;
   };
   return {room.bodies, larger(room.pairs, needs.pairs), larger(room.groups, needs.groups),
           larger(room.rows, needs.rows)};

@@ -38,6 +38,7 @@ struct PairPlan {
   bool is_of_middle;                   ///< its contacts are those of the middle of the step
   bool keeps;                          ///< its contacts are those remembered
   bool is_asked;                       ///< for contacts where the bodies stand
+  bool is_missed;                      ///< its contacts were missed when the step was solved last
   double reach, asked;                 ///< see PairReach
   std::uint32_t first_found, found;    ///< contacts
 };
@@ -79,6 +80,7 @@ struct StepArrays {
   double* quiet;               ///< see Sleep
   std::uint32_t *group, *label;
   std::uint32_t* marks;
+  std::uint8_t* has_missed;  ///< contacts, when the step was solved before
 
   // These have one for each shape.
   const double* inner_radius;

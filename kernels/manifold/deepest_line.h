@@ -34,8 +34,8 @@ inline constexpr double kLooksBeside = 0.15;
 
 /// These lines lie on a ring whose radius is first kFirstRing times the patch's reach and becomes kNextRing
 /// times as large, down to kLastRing times the reach, as soon as the depth grows by no more than the part
-/// kRingGain.
-inline constexpr double kFirstRing = 0.5, kNextRing = 0.25, kLastRing = 0.03, kRingGain = 1e-3;
+/// kRingGain. If the depth grows beyond kGrown times that reach, it is the reach from then on.
+inline constexpr double kFirstRing = 0.5, kNextRing = 0.35, kLastRing = 0.03, kRingGain = 1e-3, kGrown = 1.5;
 
 /// The search looks at no more lines than this between two rings.
 inline constexpr int kStepsOfRing = 6;
@@ -533,9 +533,13 @@ TANDEM_HD bool DeepestLine<Team>::look_beside(double reach, bool winds, Ring& ri
   const double depth = shared_.best.depth();
   if (ring.radius == 0) {
     if (!(winds || depth > kLooksBeside * reach) || !(not_convex_ || goes_on_elsewhere())) return false;
-    // A small curve may be where a large overlap ends.
-    ring.size = greater(reach, depth);
-    ring.radius = kFirstRing * ring.size;
+    ring.size = reach;
+  }
+  // A small curve may be where a large overlap ends.
+  const double size = depth > kGrown * ring.size ? depth : ring.size;
+  if (ring.radius == 0 || size > ring.size) {
+    ring.size = size;
+    ring.radius = kFirstRing * size;
   } else if (!(depth > ring.depth * (1 + kRingGain))) {
     ring.radius *= kNextRing;
   }

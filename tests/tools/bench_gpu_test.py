@@ -124,11 +124,13 @@ class BenchGpu(BenchTest):
             result = self.simulate("--frames", "360", "--sleep", *words, out=out)
             self.assertEqual((result.returncode, result.stderr), (DONE, b""))
             with h5py.File(out) as file:
+                start = file["frames/potential_energy"][0]
                 ends.append({name: file[f"frames/{name}"][-1] for name in ("sleeping", "contacts", "potential_energy", "penetration_max", "speed_max", "kinetic_energy")})
                 self.assertGreater(file["frames/triangle_pairs"][:].max(), 100)
         cpu, gpu = ends
         self.assertEqual((cpu["sleeping"], gpu["sleeping"], gpu["speed_max"], gpu["kinetic_energy"]), (20, 20, 0, 0))
-        self.assertAlmostEqual(gpu["potential_energy"] / cpu["potential_energy"], 1, delta=0.3)  # heaps on rough ground part
+        # Heaps on rough ground part: a change of friction by a few thousandths moves the end by up to 5 % of what falling gives.
+        self.assertAlmostEqual((start - gpu["potential_energy"]) / (start - cpu["potential_energy"]), 1, delta=0.1)
 
     def test_a_run_on_the_gpu_goes_on_to_the_same_bytes(self):
         self.need_gpu()

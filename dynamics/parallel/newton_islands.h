@@ -79,7 +79,8 @@ TANDEM_HD inline void begin_body(const NewtonIslandsView& view, std::uint32_t i)
   view.label[i] = i;
   view.bodies_of[i] = view.pairs_of[i] = view.contacts_of[i] = 0;
   view.layer[i] = view.island_of[i] = NewtonIslandsView::kNone;
-  view.was_solved[i] = view.is_solved[i], view.is_solved[i] = view.changes[i] = 0;
+  view.was_solved[i] = view.has_changed != nullptr ? view.is_solved[i] : 0;
+  view.is_solved[i] = view.changes[i] = 0;
 }
 
 TANDEM_HD inline void join_pair(const NewtonIslandsView& view, std::uint32_t i) {

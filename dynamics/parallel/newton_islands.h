@@ -54,8 +54,8 @@ struct NewtonIslandsView {
   std::uint32_t* island_of;                           // the same; kNone: it is not looked at
   std::uint32_t *layer, *place;                       // place: in its island, from 1
   std::uint8_t *is_solved, *was_solved;               // was: when the step was solved before
-  std::uint8_t* changes;            // the island whose first body it is has changed since then
-  const std::uint8_t* has_changed;  // a body has; null: the step was not solved before
+  std::uint32_t* changes;            // the island whose first body it is has changed since then
+  const std::uint32_t* has_changed;  // the body has; null: the step was not solved before
   // Islands have parts of these, with an element for each body. found: in any order; order: in that of the
   // island; reach: the last body that each has something to do with, as its place less 1.
   std::uint32_t *found_bodies, *order, *reach;
@@ -80,7 +80,7 @@ TANDEM_HD inline void begin_body(const NewtonIslandsView& view, std::uint32_t i)
   view.bodies_of[i] = view.pairs_of[i] = view.contacts_of[i] = 0;
   view.layer[i] = view.island_of[i] = NewtonIslandsView::kNone;
   view.was_solved[i] = view.has_changed != nullptr ? view.is_solved[i] : 0;
-  view.is_solved[i] = view.changes[i] = 0;
+  view.is_solved[i] = 0, view.changes[i] = 0;
 }
 
 TANDEM_HD inline void join_pair(const NewtonIslandsView& view, std::uint32_t i) {
@@ -93,7 +93,7 @@ TANDEM_HD inline void join_pair(const NewtonIslandsView& view, std::uint32_t i) 
 TANDEM_HD inline void count_body(const NewtonIslandsView& view, std::uint32_t i) {
   const std::uint32_t root = first_of(view.label, i);
   view.label[i] = root;
-  if (view.has_changed != nullptr && view.has_changed[i] != 0) view.changes[root] = 1;
+  if (view.has_changed != nullptr && view.has_changed[i] != 0) atomic_or(view.changes[root], 1);
   add_up_to(view.bodies_of[root], kMostNewtonBodies + 1);
 }
 

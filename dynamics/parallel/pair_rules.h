@@ -229,7 +229,8 @@ TANDEM_HD inline void join_missed(const StepArrays& a, std::uint32_t at, std::sp
   plan.is_missed = missed > 0;
   if (missed == 0) return;
   atomic_add(a.counts->missed, 1);
-  for (const std::uint32_t body : {a.records[at].pair.a, a.records[at].pair.b}) a.has_missed[body] = 1;
+  for (const std::uint32_t body : {a.records[at].pair.a, a.records[at].pair.b})
+    atomic_or(a.has_missed[body], 1);
   const std::uint32_t count = plan.keeps ? 0 : plan.found;
   plan.keeps = false;
   const std::uint32_t first = atomic_add(a.counts->found, count + missed);

@@ -35,8 +35,8 @@ struct ParallelArrays {
   Array<BodyState> states[3];
   Array<Pull> pulls;
   Array<BodyForce> forces;
-  Array<std::uint8_t> placed, idle, has_missed;
-  Array<std::uint32_t> asset, group, label, marks;
+  Array<std::uint8_t> placed, idle;
+  Array<std::uint32_t> asset, group, label, marks, has_missed;
   Array<Pose> pose;
   Array<Motion> motion;
   Array<BodyWay> ways, ways_ahead;

@@ -38,7 +38,7 @@ class ParallelNewtonStep {
     };
     take(needs_.reserve(1)), take(numbers_.reserve(3));
     take(of_bodies_.reserve(kOfBody * std::uint64_t{bodies_}));
-    take(flags_of_bodies_.reserve(3 * std::uint64_t{bodies_}));
+    take(flags_of_bodies_.reserve(2 * std::uint64_t{bodies_}));
     take(islands_.reserve(bodies_));
     take(of_pairs_.reserve(kOfPair * std::uint64_t{pairs_})), take(is_pair_solved_.reserve(pairs_));
     take(soft_pairs_.reserve(pairs_));
@@ -54,7 +54,7 @@ class ParallelNewtonStep {
   /// for input.most_pairs pairs. has_changed: if the step was solved before, which bodies have contacts since
   /// then; islands without such bodies keep what that solution wrote.
   SoftStepInput step(Executor& executor, const SoftStepInput& input, const SolverOptions& options,
-                     const SoftStepOutput& output, const std::uint8_t* has_changed = nullptr) {
+                     const SoftStepOutput& output, const std::uint32_t* has_changed = nullptr) {
     NewtonStepView view = view_of(input, options, output);
     view.islands.has_changed = has_changed;
     find_newton_islands(executor, view.islands, input.joints, input.body_count, view.takes_all());
@@ -79,7 +79,7 @@ class ParallelNewtonStep {
   }
 
  private:
-  static constexpr std::uint32_t kOfBody = 10, kOfPair = 2;
+  static constexpr std::uint32_t kOfBody = 11, kOfPair = 2;
 
   NewtonStepView view_of(const SoftStepInput& input, const SolverOptions& options,
                          const SoftStepOutput& output) const {
@@ -98,7 +98,7 @@ class ParallelNewtonStep {
                                        of_body(6),
                                        flags_of_bodies_.data(),
                                        flags_of_bodies_.data() + bodies_,
-                                       flags_of_bodies_.data() + 2 * std::uint64_t{bodies_},
+                                       of_body(10),
                                        nullptr,
                                        of_body(7),
                                        of_body(8),

@@ -354,7 +354,7 @@ class ParallelSimulation {
   }
 
   // has_changed: see ParallelNewtonStep.
-  void solve(const StepArrays& a, const std::uint8_t* has_changed = nullptr) {
+  void solve(const StepArrays& a, const std::uint32_t* has_changed = nullptr) {
     const SoftStepOutput output = {a.end, a.impulses, a.done};
     SoftStepInput input = {a.acting,     a.start,
                            a.pulls,      a.bodies,

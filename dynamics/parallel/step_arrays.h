@@ -80,7 +80,7 @@ struct StepArrays {
   double* quiet;               ///< see Sleep
   std::uint32_t *group, *label;
   std::uint32_t* marks;
-  std::uint8_t* has_missed;  ///< contacts, when the step was solved before
+  std::uint32_t* has_missed;  ///< contacts, when the step was solved before
 
   // These have one for each shape.
   const double* inner_radius;

@@ -232,7 +232,7 @@ struct BlockMatrix {
     return true;
   }
 
-  // Subtracts from a part of x[j] what those further on, which are known, make of its column.
+  // Subtracts from a part of x[j] its column times the bodies further on, whose x is known.
   template <typename Team>
   TANDEM_HD void subtract_columns(std::span<Vector6> x, std::uint32_t j, std::uint32_t part) const {
     constexpr std::uint32_t kRows = BlockPart<Team>::kRows;

@@ -19,8 +19,8 @@ namespace tandem::dynamics {
 /// solved as soft ones, and counted.
 inline constexpr std::uint32_t kMostNewtonBodies = 2048, kMostNewtonPairs = 8192;
 
-/// An island has the columns that elimination needs if it has at most so many bodies; those of others have
-/// all bodies up to the last one.
+/// If an island has at most so many bodies, its matrix has the blocks that elimination needs; in a larger
+/// island, a column has all bodies up to its last one.
 inline constexpr std::uint32_t kMostSparseBodies = 64;
 
 /// What a step by Newton's method needs and has done.

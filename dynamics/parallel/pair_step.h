@@ -201,7 +201,8 @@ struct PairStep {
     });
   }
 
-  // Contacts of pairs that missed some come behind all others.
+  // Contacts of pairs that missed some come behind all others. Without room nothing is written: the step is
+  // made again.
   void remember_missed() {
     using namespace pair_step_detail;
     const StepArrays of = a;

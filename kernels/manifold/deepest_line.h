@@ -37,8 +37,8 @@ inline constexpr double kLooksBeside = 0.15;
 /// kRingGain. If the depth grows beyond kGrown times that reach, it is the reach from then on.
 inline constexpr double kFirstRing = 0.5, kNextRing = 0.35, kLastRing = 0.03, kRingGain = 1e-3, kGrown = 1.5;
 
-/// Between two rings the search looks at kStepsOfRing lines at most. It goes on from kMostRings rings at most,
-/// since on a GPU everybody waits for the longest search; one of 2,077 searches in piles ends by that.
+/// Between two rings the search looks at kStepsOfRing lines at most. It goes on from kMostRings rings at
+/// most, since on a GPU everybody waits for the longest search; one of 2,077 searches in piles ends by that.
 inline constexpr int kStepsOfRing = 6, kMostRings = 12;
 
 /// A patch whose curve is longer than its reach by this factor winds, as a thread does: the curve around a

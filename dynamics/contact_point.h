@@ -3,6 +3,7 @@
 #include <span>
 
 #include "dynamics/rigid_body.h"
+#include "tandem/kernels/manifold_query.h"
 #include "tandem/kernels/object_pair.h"
 
 namespace tandem::dynamics {
@@ -10,6 +11,10 @@ namespace tandem::dynamics {
 /// Bodies whose points move against each other by more slops than this in a step are fast: they are not
 /// about to rest.
 inline constexpr double kFastFrom = 8;
+
+/// What a step asks of manifolds. Bodies that are deep in each other are pushed apart for many steps, however
+/// deep they are at first; and what a contact did in the step before, the step remembers by itself.
+inline constexpr ManifoldOptions kManifoldsOfStep = {.match_previous = false, .quick_depths = true};
 
 /// A point in which two bodies push against each other: what a solver makes one contact of.
 struct ContactPoint {

@@ -214,7 +214,7 @@ FinderReport ContactsAhead::find_points_of_moved() {
   report.times.update = stopwatch.lap();
   require(contacts_.find(moved_, moved_pairs_, {}), moved_);
   report.times.traversal = stopwatch.lap();
-  require(manifolds_.find(moved_, contacts_, {.match_previous = false}), moved_);
+  require(manifolds_.find(moved_, contacts_, kManifoldsOfStep), moved_);
   take_points(manifolds_, moved_pairs_, points_, report.contacts);
   report.times.generation = stopwatch.lap();
   report.counters = contacts_.counters();

@@ -67,7 +67,7 @@ double ContinuousMotion::depth_at(std::span<const BodyProperties> bodies, std::s
   }
   require(two_.place(instances), two_);
   require(contacts_.find(two_, pairs, {}), two_);
-  require(manifolds_.find(two_, contacts_, {.match_previous = false}), two_);
+  require(manifolds_.find(two_, contacts_, kManifoldsOfStep), two_);
   double depth = 0;
   for (const Manifold& manifold : manifolds_.rows())
     depth = std::max(depth, (manifold.flags & kGoesThrough) != 0 ? INFINITY : manifold.depth);

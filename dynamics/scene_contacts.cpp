@@ -70,7 +70,7 @@ class SceneContacts : public ContactFinder {
     require(contacts_.find(scene_, asked, {}), scene_);
     report_.times.traversal = stopwatch.lap();
     // The cache remembers by itself what a point did in the step before.
-    require(manifolds_.find(scene_, contacts_, {.match_previous = false}), scene_);
+    require(manifolds_.find(scene_, contacts_, kManifoldsOfStep), scene_);
     take_points(manifolds_, contacts_.pairs(), points_, report_.contacts);
     report_.times.generation = stopwatch.lap();
     report_.counters = contacts_.counters();

@@ -185,7 +185,7 @@ class CudaQuestions {
     const GpuInstances instances = {bodies.asset, bodies.pose, bodies.count};
     const GpuPairs on_gpu = {pairs.pairs, pairs.count, pairs.most};
     take(contacts_.enqueue(instances, on_gpu, kContactOptions, to_.stream()));
-    take(manifolds_.enqueue(instances, on_gpu, contacts_, {.match_previous = false}, to_.stream()));
+    take(manifolds_.enqueue(instances, on_gpu, contacts_, kManifoldsOfStep, to_.stream()));
     const GpuManifoldReport* const report = manifolds_.device_report();
     to_.once(cuda_questions_detail::TakeManifolds{contacts_.device_report(), report, needs_.data(),
                                                   found_.data()});

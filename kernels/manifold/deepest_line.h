@@ -81,9 +81,10 @@ class DeepestLine {
   TANDEM_HD void begin_with_seeds(const PatchFrame& frame, double reach);
 
   /// Finds shared.best; none where the bodies do not overlap along the normal. middle, reach: a ball around
-  /// the pieces. If there are several regions, the line goes through it. winds: the patch winds (kWinds). The
-  /// search ends as soon as a line is as deep as `enough`, which others may lower meanwhile.
-  TANDEM_HD void find(const PatchFrame& frame, const Vector3& middle, double reach, bool winds,
+  /// the pieces. If there are several regions, the line goes through it. Lines around the deepest one are
+  /// looked at if it is deeper than `flat`. The search ends as soon as a line is as deep as `enough`, which
+  /// others may lower meanwhile.
+  TANDEM_HD void find(const PatchFrame& frame, const Vector3& middle, double reach, double flat,
                       const double& enough);
 
  private:
@@ -94,13 +95,13 @@ class DeepestLine {
     int looks = 0;                ///< how often the search has gone on from here
   };
 
-  TANDEM_HD void search(double reach, bool winds, const double& enough);
+  TANDEM_HD void search(double reach, double flat, const double& enough);
   TANDEM_HD bool goes_on_elsewhere() const;
   TANDEM_HD void ask_beside(double radius);
   TANDEM_HD void take_seed_within();
   TANDEM_HD bool refutes_half_spaces() const;
   TANDEM_HD void begin_anew(double radius);
-  TANDEM_HD bool look_beside(double reach, bool winds, Ring& ring);
+  TANDEM_HD bool look_beside(double reach, double flat, Ring& ring);
   TANDEM_HD void begin_half_spaces(const Vector3& middle, double reach);
   TANDEM_HD void learn(int side, const Crossing& surface, HalfSpace& out) const;
   /// Forgets half-spaces beyond which the bodies go on, up to these heights on a line.
@@ -410,7 +411,7 @@ TANDEM_HD void DeepestLine<Team>::improve(int seed, int most_steps, bool is_prop
 /// around the best one, as long as they refute what the half-spaces prove. All of it is one loop, so that a
 /// GPU has its code once: instructions are what it waits for.
 template <typename Team>
-TANDEM_HD void DeepestLine<Team>::search(double reach, bool winds, const double& enough) {
+TANDEM_HD void DeepestLine<Team>::search(double reach, double flat, const double& enough) {
   const int deepest = shared_.from;
   int tried = 0;
   Ring ring;
@@ -424,7 +425,7 @@ TANDEM_HD void DeepestLine<Team>::search(double reach, bool winds, const double&
       if (shared_.spaces.in_plane(team_, shared_.frame.flat(from), shared_.frame.height(from), rounding()))
         continue;
     } else {
-      if (!look_beside(reach, winds, ring)) return;
+      if (!look_beside(reach, flat, ring)) return;
       seed = shared_.from;
     }
     improve(seed, by_seeds ? kMostSteps : kStepsOfRing, !by_seeds && shared_.proposed.found, enough);
@@ -531,10 +532,10 @@ TANDEM_HD void DeepestLine<Team>::begin_anew(double radius) {
 /// Looks at lines around the best one, if that is worth it, nearer and nearer until they refute what the
 /// half-spaces prove; then the search begins anew there. False if none refutes it.
 template <typename Team>
-TANDEM_HD bool DeepestLine<Team>::look_beside(double reach, bool winds, Ring& ring) {
+TANDEM_HD bool DeepestLine<Team>::look_beside(double reach, double flat, Ring& ring) {
   const double depth = shared_.best.depth();
   if (ring.radius == 0) {
-    if (!(winds || depth > kLooksBeside * reach) || !(not_convex_ || goes_on_elsewhere())) return false;
+    if (!(depth > flat) || !(not_convex_ || goes_on_elsewhere())) return false;
     ring.size = reach;
   }
   // A small curve may be where a large overlap ends.
@@ -559,12 +560,12 @@ TANDEM_HD bool DeepestLine<Team>::look_beside(double reach, bool winds, Ring& ri
 
 template <typename Team>
 TANDEM_HD void DeepestLine<Team>::find(const PatchFrame& frame, const Vector3& middle, double reach,
-                                       bool winds, const double& enough) {
+                                       double flat, const double& enough) {
   if (team_.rank() == 0) see(enough);
   begin_with_seeds(frame, reach);
   if (!shared_.best.found() || is_deep_enough()) return;
   begin_half_spaces(middle, reach);
-  search(reach, winds, enough);
+  search(reach, flat, enough);
   go_to_ends();
 }
 

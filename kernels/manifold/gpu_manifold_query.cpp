@@ -141,7 +141,7 @@ struct HostOf<GpuManifoldReport> : GpuHost<ManifoldState, GpuManifoldReport> {
   }
 
   ManifoldArgs args(const GpuInstances& instances, const GpuPairs& pairs, const GpuContactQuery& query,
-                    const GpuManifoldOptions& options) const {
+                    const ManifoldOptions& options) const {
     ManifoldArgs args = {};
     fill(args, instances);
     args.pairs = pairs;
@@ -149,7 +149,7 @@ struct HostOf<GpuManifoldReport> : GpuHost<ManifoldState, GpuManifoldReport> {
     args.query = query.device_report();
     args.capacity = capacity();
     args.match_previous = args.matches = options.match_previous;
-    args.most_points = static_cast<int>(options.most_points);
+    args.options = {static_cast<int>(options.most_points), options.quick_depths};
     args.pieces = {pieces.data(), normals.data(), curve.data(), order.data(), start.data(), words.data()};
     args.table_size = static_cast<std::uint32_t>(table.room());
     return args;
@@ -168,7 +168,7 @@ std::size_t most_manifold_bytes(const GpuManifoldCapacity& capacity, std::size_t
 }
 
 Status GpuManifoldQuery::enqueue(const GpuInstances& instances, const GpuPairs& pairs,
-                                 const GpuContactQuery& query, const GpuManifoldOptions& options,
+                                 const GpuContactQuery& query, const ManifoldOptions& options,
                                  cudaStream_t stream) {
   if (const Status status = check_most_points(options.most_points); status != Status::kOk) return status;
   const gpu::ManifoldArgs args = host_->args(instances, pairs, query, options);
@@ -178,7 +178,7 @@ Status GpuManifoldQuery::enqueue(const GpuInstances& instances, const GpuPairs& 
 }
 
 Status GpuManifoldQuery::enqueue(const GpuInstances& instances, const GpuMoved& moved,
-                                 const GpuContactQuery& query, const GpuManifoldOptions& options,
+                                 const GpuContactQuery& query, const ManifoldOptions& options,
                                  cudaStream_t stream) {
   if (const Status status = check_most_points(options.most_points); status != Status::kOk) return status;
   gpu::ManifoldArgs args = host_->args(instances, moved.moved, query, options);
@@ -191,7 +191,7 @@ Status GpuManifoldQuery::enqueue(const GpuInstances& instances, const GpuMoved& 
 }
 
 Status GpuManifoldQuery::make(const GpuInstances& instances, const GpuMoved& moved,
-                              const GpuContactQuery& query, const GpuManifoldOptions& options,
+                              const GpuContactQuery& query, const ManifoldOptions& options,
                               cudaStream_t stream) {
   GpuManifoldCapacity first = capacity();
   first.pairs = std::max({first.pairs, moved.pairs.capacity, moved.moved.capacity});
@@ -201,7 +201,7 @@ Status GpuManifoldQuery::make(const GpuInstances& instances, const GpuMoved& mov
 }
 
 Status GpuManifoldQuery::make(const GpuInstances& instances, const GpuPairs& pairs,
-                              const GpuContactQuery& query, const GpuManifoldOptions& options,
+                              const GpuContactQuery& query, const ManifoldOptions& options,
                               cudaStream_t stream) {
   GpuManifoldCapacity first = capacity();
   first.pairs = std::max(first.pairs, pairs.capacity);

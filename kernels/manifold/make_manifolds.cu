@@ -188,6 +188,12 @@ __global__ void __launch_bounds__(kThreads, 6) begin_to_join(const __grid_consta
   });
 }
 
+/// Returns whether warps go in step: if there is much to do for all of them, they wait for code more often
+/// than for each other.
+__device__ bool go_in_step(std::uint32_t rows) {
+  return rows > 4 * gridDim.x * kWarps;
+}
+
 /// Tries to join each curve of pairs of several with its neighbours, by a warp each.
 __global__ void __launch_bounds__(kThreads, 4) try_to_join(const __grid_constant__ ManifoldArgs args) {
   __shared__ WarpWalks walks[kWarps];
@@ -199,7 +205,7 @@ __global__ void __launch_bounds__(kThreads, 4) try_to_join(const __grid_constant
   if (!has_query(args)) return;
   constexpr std::uint32_t kNeighbours = manifold::RegionFinder<WarpTeam>::kNeighbours;
   const std::uint32_t own = threadIdx.x / 32, count = args.state->several_curves * kNeighbours;
-  const WarpTeam team(&walks[own]);
+  const WarpTeam team(&walks[own], go_in_step(count));
   take_rows(team, count, args.state->next_neighbour, taken[own], [&](std::uint32_t row) {
     const PairCurve curve = args.curves[row / kNeighbours];
     BodyPair& bodies = shared_bodies[own].get();
@@ -316,7 +322,7 @@ __global__ void __launch_bounds__(kThreads, 4) begin_patches(const __grid_consta
   if (!has_query(args)) return;
   ManifoldState& state = *args.state;
   if (blockIdx.x == 0 && threadIdx.x == 0 && patches_wanted(state) > patches_begun(args))
-    state.needed_points = Counter{patches_wanted(state) - patches_begun(args)} * args.most_points;
+    state.needed_points = Counter{patches_wanted(state) - patches_begun(args)} * args.options.most_points;
   for_each_patch(args, state.next_curve_of_many, state.next_curve_of_few,
                  [&](const auto& team, std::uint32_t place, const PairCurve& curve, std::uint32_t own) {
                    with_maker(args, team, memory[own], curve, [&](auto& maker, const PatchState& made) {
@@ -378,7 +384,7 @@ __global__ void __launch_bounds__(kThreads, 3) measure_depths(const __grid_const
   if (!has_query(args)) return;
   constexpr std::uint32_t kDirections = 2 * manifold::kMostTried;
   const std::uint32_t own = threadIdx.x / 32, directions = args.state->deep_patches * kDirections;
-  const WarpTeam team(&walks[own]);
+  const WarpTeam team(&walks[own], go_in_step(directions + patches_begun(args)));
   const auto measure = [&](std::uint32_t row) {
     // Deep patches come first: they take longest.
     const bool is_deep = row < directions;
@@ -390,7 +396,8 @@ __global__ void __launch_bounds__(kThreads, 3) measure_depths(const __grid_const
         direction >= search.directions)
       return;
     with_maker(args, team, memory[own], begun.of, [&](auto& maker, PatchState& state) {
-      const manifold::OverlapLine line = maker.line_along(search, direction, searches[own].get());
+      const manifold::OverlapLine line =
+          maker.line_along(search, direction, args.options, searches[own].get());
       if (!is_deep) {
         copy_state(team, begun.state, state);
         maker.end_overlap(line, searches[own].get().lines);
@@ -442,7 +449,7 @@ __global__ void __launch_bounds__(kThreads, 6) finish_patches(const __grid_const
     with_maker(args, team, memory[own], begun.of, [&](auto& maker, PatchState& state) {
       copy_state(team, begun.state, state);
       Patch* patch = nullptr;
-      maker.finish(begun.of.curve, args.most_points, choice[own].get(),
+      maker.finish(begun.of.curve, args.options, choice[own].get(),
                    [&] { return patch = &args.patches[row]; });
       if (patch == nullptr) return;
       PairPatches& pair = args.of_pair[begun.of.pair];

@@ -98,7 +98,7 @@ struct ManifoldArgs {
   GpuMoved moved;       ///< `pairs` are those that have moved; null: they are all
   bool match_previous;  ///< the call before is remembered
   bool matches;         ///< points are looked for in it
-  int most_points;
+  manifold::PatchOptions options;
 
   ManifoldState* state;
   GpuManifoldReport* host_report;  ///< in CPU memory

@@ -47,7 +47,8 @@ class ManifoldMaker {
 
   /// Finds the deepest line along a direction. The search for it ends as soon as one is as deep as
   /// search.enough.
-  TANDEM_HD OverlapLine line_along(const DepthSearch& search, int direction, SearchMemory& shared) const;
+  TANDEM_HD OverlapLine line_along(const DepthSearch& search, int direction, const PatchOptions& options,
+                                   SearchMemory& shared) const;
 
   /// Finds how deep the overlap is along a direction at least.
   TANDEM_HD double least_depth_along(const DepthSearch& search, int direction, SearchMemory& shared) const;
@@ -62,12 +63,12 @@ class ManifoldMaker {
                                  OutlineMemory& shared, LineMemory& lines);
 
   /// Does what is to be done between begin() and finish(), along one direction after the other.
-  TANDEM_HD void measure(std::uint32_t region, DepthSearch& search, OutlineMemory& shared,
-                         SearchMemory& depths);
+  TANDEM_HD void measure(std::uint32_t region, const PatchOptions& options, DepthSearch& search,
+                         OutlineMemory& shared, SearchMemory& depths);
 
   /// Chooses points. new_patch(): where the patch is to lie, or null; called by one of the team.
   template <typename NewPatch>
-  TANDEM_HD void finish(std::uint32_t region, int most_points, ChoiceMemory& shared,
+  TANDEM_HD void finish(std::uint32_t region, const PatchOptions& options, ChoiceMemory& shared,
                         const NewPatch& new_patch);
 
  private:
@@ -216,11 +217,14 @@ TANDEM_HD void ManifoldMaker<Team>::sound(DepthSearch& search, SearchMemory& sha
 
 template <typename Team>
 TANDEM_HD OverlapLine ManifoldMaker<Team>::line_along(const DepthSearch& search, int direction,
+                                                      const PatchOptions& options,
                                                       SearchMemory& shared) const {
+  const bool winds = search.measure.length > kWinds * search.reach;
+  const double flat = winds ? 0 : options.quick_depths ? INFINITY : kLooksBeside * search.reach;
   DeepestLine<Team> line(team_, bodies_, memory_, summary_, shared);
   line.begin(search.seeds);
-  line.find(PatchFrame(summary_.origin, search.along(direction)), search.middle, search.reach,
-            search.measure.length > kWinds * search.reach, search.enough);
+  line.find(PatchFrame(summary_.origin, search.along(direction)), search.middle, search.reach, flat,
+            search.enough);
   return line.best();
 }
 
@@ -268,12 +272,14 @@ TANDEM_HD_CALLED void ManifoldMaker<Team>::end_deep(std::uint32_t region, const 
 }
 
 template <typename Team>
-TANDEM_HD void ManifoldMaker<Team>::measure(std::uint32_t region, DepthSearch& search, OutlineMemory& shared,
+TANDEM_HD void ManifoldMaker<Team>::measure(std::uint32_t region, const PatchOptions& options,
+                                            DepthSearch& search, OutlineMemory& shared,
                                             SearchMemory& depths) {
   outline(region, shared, search);
   if (state_.kind != PatchKind::overlap && state_.kind != PatchKind::deep) return;
   sound(search, depths);
-  if (state_.kind == PatchKind::overlap) return end_overlap(line_along(search, 0, depths), depths.lines);
+  if (state_.kind == PatchKind::overlap)
+    return end_overlap(line_along(search, 0, options, depths), depths.lines);
   DeepLines found;
   // The directions along which the first lines are shallowest come first; of others little more is looked at.
   double known[2 * kMostTried];
@@ -285,7 +291,7 @@ TANDEM_HD void ManifoldMaker<Team>::measure(std::uint32_t region, DepthSearch& s
     }
     if (next < 0) break;  // none of the others is shallower
     known[next] = -1;
-    found.along[next] = line_along(search, next, depths);
+    found.along[next] = line_along(search, next, options, depths);
     search.enough = lesser(search.enough, enough_for_others(found.along[next]));
   }
   end_deep(region, search, found, shared, depths.lines);
@@ -540,17 +546,17 @@ TANDEM_HD void ManifoldMaker<Team>::write_manifold(const ChoiceMemory& shared, P
 
 template <typename Team>
 template <typename NewPatch>
-TANDEM_HD void ManifoldMaker<Team>::finish(std::uint32_t region, int most_points, ChoiceMemory& shared,
-                                           const NewPatch& new_patch) {
+TANDEM_HD void ManifoldMaker<Team>::finish(std::uint32_t region, const PatchOptions& options,
+                                           ChoiceMemory& shared, const NewPatch& new_patch) {
   int count = 0;
   if (state_.kind != PatchKind::ambiguous) {
     const RimFinder<Team> rim_finder(team_, bodies_, memory_, summary_, region, state_.frame,
                                      state_.candidates);
     place_candidates(rim_finder, shared);
-    if (team_.rank() == 0) keep_apart(most_points - (state_.deepest.found() ? 1 : 0), shared);
+    if (team_.rank() == 0) keep_apart(options.most_points - (state_.deepest.found() ? 1 : 0), shared);
     team_.sync();
     const int found = static_cast<int>(shared.count);
-    count = found < most_points ? found : most_points;
+    count = found < options.most_points ? found : options.most_points;
     rim_finder.name_points(shared.chosen, count, kNear / 2 * bodies_.smaller_diagonal(), state_.key);
   }
   if (team_.rank() == 0) shared.patch = new_patch();

@@ -89,7 +89,8 @@ struct ManifoldQuery::State : Allocated {
   Status group(SceneState& scene, std::size_t pairs, std::span<const Contact>& contacts);
   void name_pairs(const MovedQuery* moved);
   void make_patches(std::size_t from, std::size_t to, std::uint32_t worker, const SceneState& scene,
-                    std::span<const ObjectPair> pairs, std::span<const Contact> contacts, int most_points);
+                    std::span<const ObjectPair> pairs, std::span<const Contact> contacts,
+                    const manifold::PatchOptions& options);
   Status place_pairs(SceneState& scene, std::size_t pairs, const MovedQuery* moved, Rows out);
   void finish(const Row& row, const SceneState& scene, const ObjectPair& pair, bool remember, Rows out,
               bool match);
@@ -181,7 +182,8 @@ void ManifoldQuery::State::name_pairs(const MovedQuery* moved) {
 
 void ManifoldQuery::State::make_patches(std::size_t from, std::size_t to, std::uint32_t worker,
                                         const SceneState& scene, std::span<const ObjectPair> pairs,
-                                        std::span<const Contact> contacts, int most_points) {
+                                        std::span<const Contact> contacts,
+                                        const manifold::PatchOptions& options) {
   ManifoldWorker& own = workers[worker];
   Buffer<Patch>& patches = own.made.patches;
 #ifdef TANDEM_HAVE_LANES
@@ -198,7 +200,7 @@ void ManifoldQuery::State::make_patches(std::size_t from, std::size_t to, std::u
     const Instance &a = scene.instances[pair.a], &b = scene.instances[pair.b];
     const BodyPair bodies = {{shapes[a.asset], a.pose}, {shapes[b.asset], b.pose}};
     const std::uint32_t first = begin[row.asked], count = begin[row.asked + 1] - first;
-    own.enough_memory = own.made.add(team, bodies, contacts.data() + first, count, most_points);
+    own.enough_memory = own.made.add(team, bodies, contacts.data() + first, count, options);
     row.patches = static_cast<std::uint32_t>(patches.size() - row.first_patch);
     for (std::uint32_t k = 0; k < row.patches; ++k) {
       row.points += patches[row.first_patch + k].manifold.point_count;
@@ -328,7 +330,7 @@ Status ManifoldQuery::answer(SceneState& scene, State& state, const Asked& asked
   if (status == Status::kOk) status = state.group(scene, asked.pairs.size(), contacts);
   if (status != Status::kOk) return status;
   state.name_pairs(moved);
-  const auto most_points = static_cast<int>(options.most_points);
+  const manifold::PatchOptions of_patches = {static_cast<int>(options.most_points), options.quick_depths};
   const std::uint32_t workers = scene.workers_for(state.rows.size(), kRowsAtOnce);
   if (!scene.threads.provide(workers)) return scene.fail(Status::kCannotStartThread, 0);
   if (!state.workers.provide(workers)) return scene.fail(Status::kOutOfMemory, 0);
@@ -338,7 +340,7 @@ Status ManifoldQuery::answer(SceneState& scene, State& state, const Asked& asked
   }
   scene.threads.for_parts(workers, state.rows.size(), kRowsAtOnce,
                           [&](std::size_t from, std::size_t to, std::uint32_t worker) {
-                            state.make_patches(from, to, worker, scene, pairs, contacts, most_points);
+                            state.make_patches(from, to, worker, scene, pairs, contacts, of_patches);
                           });
   counters_ = {};
   for (std::uint32_t i = 0; i < workers; ++i) {

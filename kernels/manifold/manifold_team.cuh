@@ -316,8 +316,12 @@ __device__ __forceinline__ void each_over_warp(T (&values)[kCount], Of of) {
 
 struct WarpTeam : TeamOfWarps {
   WarpWalks* walks;
+  /// The warps of the block begin their walks together, and so share what they fetch of the code. Condition:
+  /// all of them are such teams until they exit.
+  bool in_step;
 
-  __device__ explicit WarpTeam(WarpWalks* of_warp) : walks(of_warp) {}
+  __device__ explicit WarpTeam(WarpWalks* of_warp, bool goes_in_step = false)
+      : walks(of_warp), in_step(goes_in_step) {}
   __device__ static std::uint32_t rank() { return threadIdx.x % 32; }
   __device__ static constexpr std::uint32_t size() { return 32; }
   __device__ static void sync() {
@@ -352,6 +356,7 @@ struct WarpTeam : TeamOfWarps {
 
   __device__ void walk_lines(const manifold::LineQuestions& questions, std::uint32_t count) const {
     sync();
+    if (in_step) __syncthreads();
     walk(*walks, questions, count, 0, 1);
     sync();
   }

@@ -27,7 +27,7 @@ struct alignas(64) PairPatches {
   /// Adds the patches of a pair. False: out of memory.
   template <typename Team>
   bool add(const Team& team, const manifold::BodyPair& bodies, const Contact* contacts, std::uint32_t count,
-           int most_points) {
+           const manifold::PatchOptions& options) {
     manifold::PieceMemory memory;
     if (!make_room(count, memory)) return false;
     manifold::CurveFinder<Team> finder(team, bodies, memory);
@@ -42,9 +42,9 @@ struct alignas(64) PairPatches {
     };
     for (std::uint32_t region = 0; region < summary.curves; ++region) {
       maker.begin(region, outline_, search_);
-      maker.measure(region, search_, outline_, depths_);
+      maker.measure(region, options, search_, outline_, depths_);
       ambiguous_touches += state_.kind == manifold::PatchKind::ambiguous;
-      maker.finish(region, most_points, choice_, new_patch);
+      maker.finish(region, options, choice_, new_patch);
     }
     return enough_memory;
   }

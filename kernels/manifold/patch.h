@@ -272,6 +272,12 @@ struct DepthSearch {
   }
 };
 
+/// What a caller asks of patches; see ManifoldOptions.
+struct PatchOptions {
+  int most_points;
+  bool quick_depths;
+};
+
 /// Returns how deep a line along any other direction is if it need not be looked at, as one was found.
 TANDEM_HD inline double enough_for_others(const OverlapLine& line) {
   return line.found() ? line.depth() * (1 + 2 * kShallower) : INFINITY;

@@ -200,14 +200,13 @@ class Gpu final : public SceneDevice {
               const DeviceAnswer<Manifold, ManifoldCounters>& found) override {
     if (found.pairs.size() == 0) found.memory.reset();  // no points of before are found again
     points.clear();
-    const GpuManifoldOptions on_gpu = {options.match_previous, options.most_points};
     return ask<GpuManifoldQuery>(scene, found, Status::kOk, [&](auto& query) {
       const auto& query_of_contacts = query_of<GpuContactQuery>(contacts);
       GpuMoved on_gpu_moved = {};
       Status status = moved != nullptr ? upload_moved(scene, *moved, on_gpu_moved) : Status::kOk;
       if (status == Status::kOk)
-        status = moved != nullptr ? query.make(instances_, on_gpu_moved, query_of_contacts, on_gpu, kStream)
-                                  : query.make(instances_, pairs_, query_of_contacts, on_gpu, kStream);
+        status = moved != nullptr ? query.make(instances_, on_gpu_moved, query_of_contacts, options, kStream)
+                                  : query.make(instances_, pairs_, query_of_contacts, options, kStream);
       if (status == Status::kOk) status = copy(query.manifolds(), query.report().manifolds, found.rows);
       if (status == Status::kOk) status = copy(query.points(), query.report().points, points);
       return status;

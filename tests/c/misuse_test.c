@@ -117,7 +117,7 @@ static void test_struct_sizes(tandem_asset* cube) {
   }
   // Each struct of options has its own check.
   const tandem_pair_options pairs = {0, 0, 0};
-  const tandem_manifold_options manifolds = {0, 0, 0, 0};
+  const tandem_manifold_options manifolds = {0, 0, 0, 0, 0};
   const tandem_distance_options distances = {0, 0, 0, 0, 0, NULL, 0, NULL, 0};
   const tandem_impact_options impacts = {0, 0, 0, 0, NULL, 0, NULL, 0};
   const tandem_tolerance_options verdicts = {0, 0, 0, NULL, 0};
@@ -161,8 +161,8 @@ static void test_bad_options(tandem_asset* cube) {
   const tandem_pair_options unlike = {sizeof unlike, 2, 0};
   CHECK_STATUS(tandem_scene_find_pairs(scene, &unlike), TANDEM_BAD_OPTION);
   CHECK(pair_count(scene, TANDEM_PAIRS) == 0);
-  const tandem_manifold_options many = {sizeof many, 8, 0, 0}, twice = {sizeof twice, 0, 2, 0};
-  tandem_manifold_options kept = {sizeof kept, 0, 0, 2};
+  const tandem_manifold_options many = {sizeof many, 8, 0, 0, 0}, twice = {sizeof twice, 0, 2, 0, 0};
+  tandem_manifold_options kept = {sizeof kept, 0, 0, 2, 0};
   CHECK_STATUS(tandem_scene_find_contacts(scene, NULL), TANDEM_OK);
   CHECK_STATUS(tandem_scene_find_manifolds(scene, &many), TANDEM_BAD_OPTION);
   CHECK_STATUS(tandem_scene_set_threads(scene, 1025), TANDEM_BAD_OPTION);
@@ -273,7 +273,7 @@ static void test_allocators(const char* folder) {
   const tandem_instance bodies[2] = {at(0, 0, 0), at(0.5, 0, 0)};
   const tandem_pair_options pairs = {sizeof pairs, 0, 0};
   const tandem_contact_options contacts = {sizeof contacts, 0, 0, 0, 0, 0, 0, NULL, 0};
-  const tandem_manifold_options manifolds = {sizeof manifolds, 0, 0, 0};
+  const tandem_manifold_options manifolds = {sizeof manifolds, 0, 0, 0, 0};
   const tandem_distance_options distances = {sizeof distances, 0, 0, 0, 0, NULL, 0, NULL, 0};
   const tandem_motion still[3] = {{{0}, {0}, {0}}, {{0}, {0}, {0}}, {{0}, {0}, {0}}};
   const tandem_impact_options impacts = {sizeof impacts, 0, 1, 0, still, 3, NULL, 0};

@@ -266,7 +266,7 @@ static void test_rows_and_calls(const tandem_allocator* allocator) {
   const double points[] = {0.25, 0.5, 0.5, 50, 50, 50};
   const tandem_bodies_at_options at_points = {sizeof at_points, 0, points, 2};
   tandem_questions questions = {.struct_size = sizeof questions, .bodies_at = &at_points};
-  const tandem_manifold_options manifolds = {sizeof manifolds, 0, 0, 0};
+  const tandem_manifold_options manifolds = {sizeof manifolds, 0, 0, 0, 0};
   CHECK_STATUS(tandem_scene_find(scene, &questions), TANDEM_OK);
   CHECK(contact_count(scene) == 52);
   const tandem_body_at* there = tandem_scene_bodies_at(scene, &count);
@@ -323,7 +323,7 @@ static void test_rows_and_calls(const tandem_allocator* allocator) {
   // Pairs that have not moved keep their manifolds.
   const double tolerance_of_pair[17] = {0};
   tandem_moved_options tolerant = {.struct_size = sizeof tolerant, .tolerance = 0.01};
-  const tandem_manifold_options keep = {sizeof keep, 0, 1, 1};
+  const tandem_manifold_options keep = {sizeof keep, 0, 1, 1, 0};
   size_t manifold_count = 0;
   for (int step = 0; step < 3; ++step) {
     CHECK_STATUS(tandem_scene_find_moved(scene, &tolerant), TANDEM_OK);

@@ -151,6 +151,7 @@ class CDoor final : public Door {
       auto chosen = sized<tandem_manifold_options>();
       chosen.most_points = options.value("most_points", 0u);
       chosen.ignore_previous = !flag(options, "match_previous", true);
+      chosen.quick_depths = flag(options, "quick_depths", false);
       chosen.keep = flag(options, "keep");
       Found found = answered(tandem_scene_find_manifolds(scene_, &chosen),
                              chosen.keep != 0 ? TANDEM_MOVED : TANDEM_CONTACTS, tandem_scene_manifolds,

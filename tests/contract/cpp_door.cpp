@@ -135,7 +135,8 @@ class CppDoor final : public Door {
   }
 
   Found manifolds(const Json& options) {
-    ManifoldOptions chosen{.match_previous = flag(options, "match_previous", true)};
+    ManifoldOptions chosen{.match_previous = flag(options, "match_previous", true),
+                           .quick_depths = flag(options, "quick_depths", false)};
     if (options.contains("most_points")) chosen.most_points = options["most_points"];
     const Status status = flag(options, "keep") ? manifolds_.find(*scene_, moved_, contacts_, chosen)
                                                 : manifolds_.find(*scene_, contacts_, chosen);

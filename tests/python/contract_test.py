@@ -13,7 +13,7 @@ from scene_table import SCENES, bodies_of, expect_rows, hash_of, motions_of, opt
 
 MESHES = Path(os.environ["TANDEM_CONTRACT_MESHES"])
 ON_DEVICE = {"device": os.environ["TANDEM_DEVICE"]} if "TANDEM_DEVICE" in os.environ else {}
-OPTIONS = ("pairs", "reach", "mode", "first_contact_only", "self_pairs", "sides", "within", "add_error_bounds", "leave_out_rings", "most_points", "match_previous", "keep", "absolute_tolerance",
+OPTIONS = ("pairs", "reach", "mode", "first_contact_only", "self_pairs", "sides", "within", "add_error_bounds", "leave_out_rings", "most_points", "match_previous", "keep", "quick_depths", "absolute_tolerance",
            "relative_tolerance", "tolerance", "duration")
 # The package says these by ValueError, because it checks arguments itself.
 REFUSED_AS_ARGUMENT = {"OutOfRange", "BadMotion", "BadOption", "BadReach", "BadTolerance", "BadDuration", "MotionMismatch"}

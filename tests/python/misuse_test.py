@@ -163,6 +163,7 @@ FLAGS = [
     ("add_error_bounds", lambda s, value: s.contacts(add_error_bounds=value)),
     ("self_pairs", lambda s, value: s.pairs(self_pairs=value)),
     ("match_previous", lambda s, value: s.manifolds(match_previous=value)),
+    ("quick_depths", lambda s, value: s.manifolds(quick_depths=value)),
     ("gpu_blocks", lambda s, value: tandem.build(BOX_VERTICES, BOX_FACES, gpu_blocks=value)),
     ("topology", lambda s, value: tandem.build(BOX_VERTICES, BOX_FACES, topology=value)),
     ("refit", lambda s, value: tandem.build(BOX_VERTICES, BOX_FACES, refit=value)),

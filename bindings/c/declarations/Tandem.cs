@@ -232,6 +232,7 @@ public unsafe struct tandem_manifold_options {
   public uint most_points;
   public uint ignore_previous;
   public uint keep;
+  public uint quick_depths;
 }
 
 [StructLayout(LayoutKind.Sequential)]

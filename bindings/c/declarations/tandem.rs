@@ -430,6 +430,7 @@ pub struct tandem_manifold_options {
     pub most_points: u32,
     pub ignore_previous: u32,
     pub keep: u32,
+    pub quick_depths: u32,
 }
 
 #[repr(C)]

@@ -64,15 +64,15 @@ const Row* result(std::span<const Found> found, size_t* count) {
 
 /// The options of manifolds, on the CPU or on a GPU. keep: null where pairs cannot be kept. Result:
 /// TANDEM_OK, TANDEM_BAD_STRUCT_SIZE or TANDEM_BAD_OPTION.
-template <typename Options>
-tandem_status read_manifold_options(const tandem_manifold_options* given, Options& options,
-                                    bool* keep = nullptr) {
+inline tandem_status read_manifold_options(const tandem_manifold_options* given, ManifoldOptions& options,
+                                           bool* keep = nullptr) {
   tandem_manifold_options read;
   if (const tandem_status status = read_struct(given, read); status != TANDEM_OK) return status;
-  if (read.most_points > kMostManifoldPoints || read.ignore_previous > 1 ||
+  if (read.most_points > kMostManifoldPoints || read.ignore_previous > 1 || read.quick_depths > 1 ||
       read.keep > (keep != nullptr ? 1 : 0))
     return TANDEM_BAD_OPTION;
   options.match_previous = read.ignore_previous == 0;
+  options.quick_depths = read.quick_depths != 0;
   if (keep != nullptr) *keep = read.keep != 0;
   if (read.most_points != 0) options.most_points = read.most_points;
   return TANDEM_OK;

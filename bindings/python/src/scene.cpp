@@ -149,13 +149,14 @@ class Scene {
     return nb::make_tuple(pairs_of(TANDEM_MOVED), found);
   }
 
-  nb::tuple manifolds(std::uint32_t most_points, bool match_previous, bool keep) {
+  nb::tuple manifolds(std::uint32_t most_points, bool match_previous, bool keep, bool quick_depths) {
     const Turn turn = take_turn();
     find_missing_contacts();
     auto options = sized<tandem_manifold_options>();
     options.most_points = most_points;
     options.ignore_previous = !match_previous;
     options.keep = keep;
+    options.quick_depths = quick_depths;
     ask([&](tandem_scene* scene) { return tandem_scene_find_manifolds(scene, &options); });
     return nb::make_tuple(pairs_of(keep ? TANDEM_MOVED : TANDEM_CONTACTS), rows<tandem_scene_manifolds>(),
                           rows<tandem_scene_points>());

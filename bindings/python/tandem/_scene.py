@@ -414,7 +414,7 @@ class Scene:
                                     flag(add_error_bounds, "add_error_bounds"), whole_number(leave_out_rings, "leave_out_rings", 0, 8))
         return Contacts(_frombuffer(found[0], PAIR), _frombuffer(found[1], CONTACT), Counters._make(found[2]))
 
-    def manifolds(self, *, most_points: int = 7, match_previous: bool = True, keep: bool = False) -> Manifolds:
+    def manifolds(self, *, most_points: int = 7, match_previous: bool = True, keep: bool = False, quick_depths: bool = False) -> Manifolds:
         """Makes contact manifolds of the last `contacts`, or, where none were asked for since bodies were placed, moved, added or removed, of all contacts, which
         are found first. They need all contacts: with `first_contact_only` they are of the one triangle pair that was found.
 
@@ -423,6 +423,7 @@ class Scene:
             match_previous: points are looked for among those of the last call, and keep their `id`.
             keep: the last `contacts` are of the pairs that have `moved`; the others keep the manifolds that they had, moved with the bodies, and rows are about
                 all pairs of `moved`.
+            quick_depths: less time for deep overlaps of bodies that are not convex, more of whose depths are too small then.
 
         Raises:
             Error: the last `contacts` raised one; an asset has no topology.
@@ -431,7 +432,8 @@ class Scene:
         >>> manifolds["normal"].tolist(), manifolds["depth"].tolist(), len(points)
         ([[0.0, 0.0, 1.0]], [0.25], 4)
         """
-        pairs, manifolds, points = self._core.manifolds(whole_number(most_points, "most_points", 1, 7), flag(match_previous, "match_previous"), flag(keep, "keep"))
+        pairs, manifolds, points = self._core.manifolds(whole_number(most_points, "most_points", 1, 7), flag(match_previous, "match_previous"), flag(keep, "keep"),
+                                                        flag(quick_depths, "quick_depths"))
         return Manifolds(_frombuffer(pairs, PAIR), _frombuffer(manifolds, MANIFOLD), _frombuffer(points, POINT))
 
     def contained(self) -> Contained:

@@ -426,12 +426,12 @@ class Query:
         bodies, _, chosen, on = self._about(instances, asset, pose, None, filter, stream)
         return Rows(self._core.pairs(bodies, flag(sorted, "sorted"), amount(within, "within", FARTHEST), chosen, on), PAIR)
 
-    def manifolds(self, *, most_points: int = 7, match_previous: bool = True) -> Manifolds:
+    def manifolds(self, *, most_points: int = 7, match_previous: bool = True, quick_depths: bool = False) -> Manifolds:
         """Makes contact manifolds of the last `contacts(..., grouped=True)` of this query, whose arrays must be as they were, on its stream: where that was sorted
         too, the rows of the CPU, byte for byte. They are copied within the GPU, since the query keeps its own to find the points again in the next step."""
         if not 1 <= most_points <= 7:
             raise ValueError(f"most_points is {most_points} where 1 to 7 is wanted")
-        pairs, manifolds, points = self._core.manifolds(most_points, flag(match_previous, "match_previous"))
+        pairs, manifolds, points = self._core.manifolds(most_points, flag(match_previous, "match_previous"), flag(quick_depths, "quick_depths"))
         return Manifolds(_found(pairs, self._given), Rows(manifolds, MANIFOLD), Rows(points, POINT))
 
     def contained(self) -> Contained:

@@ -38,8 +38,8 @@ export const layouts = {
     },
   tandem_contact_counters: { bytes: 56, fields: { object_pairs: ["u64", 0], block_pairs: ["u64", 8], candidates: ["u64", 16], decided_by_float32:
     ["u64", 24], decided_by_float64: ["u64", 32], decided_exactly: ["u64", 40], contacts: ["u64", 48] } },
-  tandem_manifold_options: { bytes: 16, fields: { struct_size: ["u32", 0], most_points: ["u32", 4], ignore_previous: ["u32", 8], keep: ["u32", 12] }
-    },
+  tandem_manifold_options: { bytes: 20, fields: { struct_size: ["u32", 0], most_points: ["u32", 4], ignore_previous: ["u32", 8], keep: ["u32", 12],
+    quick_depths: ["u32", 16] } },
   tandem_manifold: { bytes: 96, fields: { normal: ["f64", 0, 3], area_vector: ["f64", 24, 3], centre: ["f64", 48, 3], depth: ["f64", 72], pair:
     ["u32", 80], first_point: ["u32", 84], point_count: ["u32", 88], flags: ["u32", 92] } },
   tandem_manifold_point: { bytes: 128, fields: { position: ["f64", 0, 3], in_a: ["f64", 24, 3], in_b: ["f64", 48, 3], normal: ["f64", 72, 3], depth:

@@ -206,7 +206,7 @@ export class Scene {
   /** Finds every pair of triangles that meet. */
   contacts(options?: ContactOptions): { pairs: Rows<ObjectPair>; contacts: Rows<Contact>; counters: ContactCounters };
   /** Makes manifolds of the contacts that were found last. */
-  manifolds(options?: { most_points?: number; match_previous?: boolean }): {
+  manifolds(options?: { most_points?: number; match_previous?: boolean; quick_depths?: boolean }): {
     pairs: Rows<ObjectPair>; manifolds: Rows<Manifold>; points: Rows<ManifoldPoint>; counters: ManifoldCounters;
   };
   contained(): { pairs: Rows<ObjectPair>; contained: Rows<Containment>; counters: ContainmentCounters };

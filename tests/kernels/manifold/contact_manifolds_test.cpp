@@ -133,6 +133,12 @@ TEST(ManifoldQuery, PointsHaveDifferentIdsWhereRoundingIsAsLargeAsTriangles) {
   EXPECT_GT(points, 800u);
 }
 
+// Two bodies that overlap in several places, or not at all.
+void throw_cows(ManifoldScene& scene, RandomPoses& random) {
+  scene.bodies[0].pose = any_motion(random, 0);
+  scene.bodies[1].pose = any_motion(random, 0.6);
+}
+
 TEST(ManifoldQuery, FewerPointsMayBeAskedFor) {
   ManifoldScene scene;
   fill(scene, 6, 40);
@@ -150,6 +156,36 @@ TEST(ManifoldQuery, FewerPointsMayBeAskedFor) {
   }
 }
 
+// A body that is not convex may be deeper beside the line that a quick search takes for the deepest.
+TEST(ManifoldQuery, QuickDepthsAreNeverDeeper) {
+  RandomPoses random(11);
+  ManifoldScene scene;
+  scene.add_shape(project_mesh("cow_1500.obj"));
+  scene.add_shape(cube(0.3f));
+  scene.add_body(0, kIdentityPose);
+  scene.add_body(0, kIdentityPose);
+  for (const std::uint32_t shape : {0u, 1u}) {
+    scene.bodies[0].asset = scene.bodies[1].asset = shape;
+    int seen = 0, less_deep = 0;
+    for (int trial = 0; trial < trials(60, 20); ++trial) {
+      throw_cows(scene, random);
+      scene.find();
+      const std::vector<Manifold> all(scene.manifolds().begin(), scene.manifolds().end());
+      scene.find(kIdentityPose, {.match_previous = false, .quick_depths = true});
+      ASSERT_EQ(all.size(), scene.manifolds().size()) << trial;
+      for (std::size_t i = 0; i < all.size(); ++i, ++seen) {
+        const Manifold& quick = scene.manifolds()[i];
+        // Another direction may be the shallowest by depths that are too small.
+        if (dot(vector_of(quick.normal), vector_of(all[i].normal)) < 1 - 1e-9) continue;
+        EXPECT_LE(quick.depth, all[i].depth * (1 + 1e-5)) << trial;
+        less_deep += quick.depth < 0.99 * all[i].depth;
+      }
+    }
+    EXPECT_GT(seen, 10) << shape;
+    EXPECT_EQ(less_deep > 0, shape == 0) << less_deep;
+  }
+}
+
 TEST(ManifoldQuery, AnInstanceWithItselfHasNone) {
   ManifoldScene scene;
   scene.add_shape(joined(cube(0.5f), moved(cube(0.5f), 0.25f, 0.25f, 0.75f)));
@@ -161,12 +197,6 @@ TEST(ManifoldQuery, AnInstanceWithItselfHasNone) {
   ASSERT_EQ(scene.made.find(scene.scene, scene.query), Status::kOk);
   EXPECT_TRUE(scene.manifolds().empty());
   EXPECT_EQ(scene.made.counters().contacts, scene.query.rows().size());
-}
-
-// Two bodies that overlap in several places, or not at all.
-void throw_cows(ManifoldScene& scene, RandomPoses& random) {
-  scene.bodies[0].pose = any_motion(random, 0);
-  scene.bodies[1].pose = any_motion(random, 0.6);
 }
 
 struct Seen {

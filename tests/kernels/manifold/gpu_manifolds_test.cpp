@@ -81,23 +81,21 @@ class BothSides {
   /// Makes the manifolds of the CPU, and of the GPU as often as room was too small, and compares them.
   /// Result: how many points there are.
   std::size_t step(const std::vector<Instance>& instances, const std::vector<ObjectPair>& pairs,
-                   bool match_previous = true) {
-    const Result cpu = on_cpu(instances, pairs, match_previous);
+                   const ManifoldOptions& options = {}) {
+    const Result cpu = on_cpu(instances, pairs, options);
     const GpuScene scene(std::span<const AssetView>(), instances, pairs);
     EXPECT_EQ(gpu_query_.find_contacts(scene.instances(), scene.pairs(), test::grouped_options(), nullptr),
               Status::kOk);
-    EXPECT_EQ(
-        gpu_.make(scene.instances(), scene.pairs(), gpu_query_, {.match_previous = match_previous}, nullptr),
-        Status::kOk);
+    EXPECT_EQ(gpu_.make(scene.instances(), scene.pairs(), gpu_query_, options, nullptr), Status::kOk);
     EXPECT_LE(gpu_.bytes(), most_manifold_bytes(gpu_.capacity(), uploaded_.assets().size()));
     expect_same(cpu, result_of(gpu_));
     return cpu.points.size();
   }
 
   Result on_cpu(const std::vector<Instance>& instances, const std::vector<ObjectPair>& pairs,
-                bool match_previous) {
+                const ManifoldOptions& options = {}) {
     EXPECT_EQ(query_.find(instances, pairs, {}), Status::kOk);
-    EXPECT_EQ(manifolds_.find(query_.scene, query_.query, {.match_previous = match_previous}), Status::kOk);
+    EXPECT_EQ(manifolds_.find(query_.scene, query_.query, options), Status::kOk);
     return {{manifolds_.rows().begin(), manifolds_.rows().end()},
             {manifolds_.points().begin(), manifolds_.points().end()},
             manifolds_.counters()};
@@ -163,7 +161,8 @@ TEST_F(GpuManifolds, GoOnFromStepToStep) {
     BothSides both(scene.assets, contents);
     std::size_t points = 0;
     for (int step = 0; step < 8; ++step) {
-      points += both.step(scene.instances, test::all_pairs(scene.instances, false, random), step != 4);
+      points += both.step(scene.instances, test::all_pairs(scene.instances, false, random),
+                          {.match_previous = step != 4});
       if (HasFailure()) return;
       move(scene.instances, random, 2e-3);
     }
@@ -176,9 +175,21 @@ TEST_F(GpuManifolds, OfPairsWithManyContacts) {
   test::RandomPoses random(55);
   BothSides both(scene.assets);
   for (int step = 0; step < 3 && !HasFailure(); ++step) {
-    EXPECT_GT(both.step(scene.instances, test::all_pairs(scene.instances, true, random)), 100u);
+    EXPECT_GT(both.step(scene.instances, test::all_pairs(scene.instances, true, random),
+                        {.quick_depths = step == 1}),
+              100u);
     move(scene.instances, random, 1e-3);
   }
+}
+
+/// So many that warps go in step.
+TEST_F(GpuManifolds, OfManyPairs) {
+  constexpr std::uint32_t kBodies = 20'000;
+  const BodyScene scene = boxes(kBodies, 0.3, 61);
+  std::vector<ObjectPair> pairs;
+  for (std::uint32_t i = 1; i < kBodies; ++i) pairs.push_back({i - 1, i});
+  BothSides both(scene.assets);
+  EXPECT_GT(both.step(scene.instances, pairs), 60'000u);
 }
 
 /// Boxes in a lattice, as they lie in an exact stack: ties all over.
@@ -204,7 +215,7 @@ TEST_F(GpuManifolds, WithoutRoomTellWhatTheyNeed) {
   BothSides both(scene.assets);
   std::vector<ObjectPair> pairs = test::all_pairs(scene.instances, false, random);
   for (int step = 0; step < 3; ++step) {
-    const Result cpu = both.on_cpu(scene.instances, pairs, true);
+    const Result cpu = both.on_cpu(scene.instances, pairs);
     const GpuScene on_gpu(std::span<const AssetView>(), scene.instances, pairs);
     ASSERT_EQ(
         both.gpu_query().find_contacts(on_gpu.instances(), on_gpu.pairs(), test::grouped_options(), nullptr),
@@ -250,7 +261,7 @@ TEST_F(GpuManifolds, OfAGraphThatIsReplayed) {
   });
   for (int step = 0; step < 3; ++step) {
     stream.launch();
-    expect_same(both.on_cpu(scene.instances, pairs, true), result_of(both.gpu()));
+    expect_same(both.on_cpu(scene.instances, pairs), result_of(both.gpu()));
   }
 }
 
@@ -262,7 +273,7 @@ TEST_F(GpuManifolds, HaveFromOneToSevenPoints) {
       both.gpu_query().find_contacts(on_gpu.instances(), on_gpu.pairs(), test::grouped_options(), nullptr),
       Status::kOk);
   const auto make = [&](std::uint32_t most_points) {
-    const GpuManifoldOptions options = {.most_points = most_points};
+    const ManifoldOptions options = {.most_points = most_points};
     return both.gpu().make(on_gpu.instances(), on_gpu.pairs(), both.gpu_query(), options, nullptr);
   };
   for (const std::uint32_t bad : {0u, kMostManifoldPoints + 1, 4000000000u})

@@ -22,7 +22,7 @@ PatchesOfPair patches_of(const Team& team, const manifold::BodyPair& bodies,
                          std::span<const Contact> contacts) {
   PairPatches made;
   EXPECT_TRUE(made.add(team, bodies, contacts.data(), static_cast<std::uint32_t>(contacts.size()),
-                       static_cast<int>(kMostManifoldPoints)));
+                       {static_cast<int>(kMostManifoldPoints), false}));
   PatchesOfPair out = {{}, made.segments, made.ambiguous_touches};
   out.patches.assign(made.patches.data(), made.patches.data() + made.patches.size());
   std::sort(out.patches.begin(), out.patches.end(),

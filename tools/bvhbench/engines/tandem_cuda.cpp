@@ -144,7 +144,7 @@ class CudaContacts final : public GpuContactEngine {
     return most_query_bytes(query_.capacity(), options(order), shapes().size());
   }
 
-  static constexpr GpuManifoldOptions kOfFeatures = {.match_previous = false};
+  static constexpr ManifoldOptions kOfFeatures = {.match_previous = false};
 
   ContactOptions options_;
   GpuContactQuery query_;

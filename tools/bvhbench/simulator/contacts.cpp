@@ -61,9 +61,7 @@ class MeshContactFinder : public ContactFinder {
     for (const TriangleContact& c : found_.triangles) {
       if (!is_kept_[c.pair]) contacts_.push_back({c.pair, c.triangle_a, c.triangle_b, 0, 0});
     }
-    // The cache remembers by itself what a point did in the step before.
-    const ManifoldOptions options = {.match_previous = false};
-    require(manifolds_.find(scene_, found_.pairs, contacts_, options), scene_);
+    require(manifolds_.find(scene_, found_.pairs, contacts_, kManifoldsOfStep), scene_);
     take_points(manifolds_, found_.pairs, points_, report_.contacts);
   }
 

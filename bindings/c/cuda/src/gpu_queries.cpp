@@ -65,8 +65,8 @@ Read<GpuContactOptions> read_options(const tandem_gpu_query_options* given) {
   return {TANDEM_OK, options};
 }
 
-Read<GpuManifoldOptions> read_options(const tandem_manifold_options* given) {
-  GpuManifoldOptions options;
+Read<ManifoldOptions> read_options(const tandem_manifold_options* given) {
+  ManifoldOptions options;
   const tandem_status status = read_manifold_options(given, options);
   return {status, options};
 }

@@ -576,6 +576,8 @@ typedef struct tandem_manifold_options {
   uint32_t keep;  ///< 1: the contacts are those of tandem_scene_moved(); manifolds of pairs that have not
                   ///< moved are the ones that were found, moved with the bodies (docs/contacts.md), and
                   ///< tandem_manifold::pair is a row of the pairs of TANDEM_MOVED
+  uint32_t quick_depths;  ///< 1: less time for deep overlaps of bodies that are not convex, more of whose
+                          ///< depths are too small then (docs/contacts.md)
 } tandem_manifold_options;
 
 enum { TANDEM_TOUCHING = 1, TANDEM_OPEN_CURVE = 2, TANDEM_GOES_THROUGH = 4, TANDEM_AMBIGUOUS = 8 };

@@ -88,7 +88,7 @@ Rows Query::copy(const void* rows, std::size_t count, std::size_t row_bytes, con
   return {std::move(memory), to->data(), count, row_bytes};
 }
 
-nb::tuple Query::manifolds(std::uint32_t most_points, bool match_previous) {
+nb::tuple Query::manifolds(std::uint32_t most_points, bool match_previous, bool quick_depths) {
   const Turn turn(busy_, kBusy);
   const OnDevice current(device());
   const Last& of = last();
@@ -96,6 +96,7 @@ nb::tuple Query::manifolds(std::uint32_t most_points, bool match_previous) {
   auto options = sized<tandem_manifold_options>();
   options.most_points = most_points;
   options.ignore_previous = !match_previous;
+  options.quick_depths = quick_depths;
   const Instances& bodies = bodies_of(of.instances, device());
   const auto report = ManifoldMakers::run(manifolds_, [&](tandem_gpu_manifolds* maker) {
     return tandem_gpu_manifolds_find(maker, &bodies.get(), &of.pairs.pairs, of.contacts.get(), &options,

@@ -148,7 +148,7 @@ class Query {
                      bool grouped, const GpuFilter* filter, const Stream& stream);
   nb::object pairs(nb::object instances, bool sorted, double within, const GpuFilter* filter,
                    const Stream& stream);
-  nb::tuple manifolds(std::uint32_t most_points, bool match_previous);
+  nb::tuple manifolds(std::uint32_t most_points, bool match_previous, bool quick_depths);
   nb::tuple contained();
   nb::tuple distances(nb::object instances, nb::object pairs, std::optional<double> reach, double absolute,
                       double relative, const GpuFilter* filter, const Stream& stream);

@@ -14,6 +14,9 @@ struct ManifoldOptions {
   bool match_previous = true;
   std::uint32_t most_points =
       kMostManifoldPoints;  ///< of a manifold, from 1 to kMostManifoldPoints, else kBadOption
+  /// If an overlap of bodies that are not convex is deep, lines around the deepest one found are not looked
+  /// at. This takes less time, but more depths are too small (docs/contacts.md).
+  bool quick_depths = false;
 };
 
 /// Makes contact manifolds of contacts. Rows are manifolds by ascending pair and, within a pair, by their

@@ -8,12 +8,6 @@
 
 namespace tandem {
 
-struct GpuManifoldOptions {
-  /// See ManifoldOptions.
-  bool match_previous = true;
-  std::uint32_t most_points = kMostManifoldPoints;
-};
-
 /// The number of each that there is room for, or that needs room.
 struct GpuManifoldCapacity {
   std::uint32_t pairs = 0;      ///< object pairs of the query
@@ -51,19 +45,19 @@ class GpuManifoldQuery : public GpuAssetQuestion<GpuManifoldCapacity, GpuManifol
   /// Queues the making of manifolds behind what `stream` holds, the contact query among it, whose contacts
   /// are grouped. Result: also kBadOption (most_points). Condition: set_assets() and reserve().
   Status enqueue(const GpuInstances& instances, const GpuPairs& pairs, const GpuContactQuery& query,
-                 const GpuManifoldOptions& options, cudaStream_t stream);
+                 const ManifoldOptions& options, cudaStream_t stream);
 
   /// Makes manifolds of a contact query that has ended, and waits for them. Result: also kOutOfRange where
   /// that query is not complete.
   Status make(const GpuInstances& instances, const GpuPairs& pairs, const GpuContactQuery& query,
-              const GpuManifoldOptions& options, cudaStream_t stream);
+              const ManifoldOptions& options, cudaStream_t stream);
 
   /// Do the same where pairs are kept: `query` is about moved.moved, and rows are about moved.pairs, as those
   /// of ManifoldQuery. The last call is remembered whatever the options say.
   Status enqueue(const GpuInstances& instances, const GpuMoved& moved, const GpuContactQuery& query,
-                 const GpuManifoldOptions& options, cudaStream_t stream);
+                 const ManifoldOptions& options, cudaStream_t stream);
   Status make(const GpuInstances& instances, const GpuMoved& moved, const GpuContactQuery& query,
-              const GpuManifoldOptions& options, cudaStream_t stream);
+              const ManifoldOptions& options, cudaStream_t stream);
 
   /// Return report().manifolds manifolds and report().points points. They are in the order of ManifoldQuery
   /// if the pairs are in its order.

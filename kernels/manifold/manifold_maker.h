@@ -322,8 +322,9 @@ TANDEM_HD void ManifoldMaker<Team>::take_rim(const LineMemory& lines) {
 
 template <typename Team>
 TANDEM_HD void ManifoldMaker<Team>::end_overlap(const OverlapLine& line, LineMemory& lines) {
-  team_.sync();  // all are done with the lines of the search
-  take_deepest(line, state_.bent && line.found() && goes_through(line, state_.frame, lines));
+  const bool may_go_through = state_.bent && line.found();
+  team_.sync();  // all have read that, and are done with the lines of the search
+  take_deepest(line, may_go_through && goes_through(line, state_.frame, lines));
   RidgeFinder<Team>(team_, bodies_, state_).find(lines);
 }
 

@@ -1,71 +1,26 @@
-#include <algorithm>
-#include <cstring>
-
-#include "kernels/manifold/pair_patches.h"
-#include "kernels/manifold/shape.h"
 #include "kernels/random_scenes.h"
+#include "made_patches.h"
 #include "manifold_scene.h"
 
 #ifdef TANDEM_HAVE_LANES
 namespace tandem::test {
 namespace {
 
-using manifold::Patch;
-
-struct PatchesOfPair {
-  std::vector<Patch> patches;
-  std::uint64_t segments, ambiguous_touches;
-};
-
-template <typename Team>
-PatchesOfPair patches_of(const Team& team, const manifold::BodyPair& bodies,
-                         std::span<const Contact> contacts) {
-  PairPatches made;
-  EXPECT_TRUE(made.add(team, bodies, contacts.data(), static_cast<std::uint32_t>(contacts.size()),
-                       {static_cast<int>(kMostManifoldPoints), false}));
-  PatchesOfPair out = {{}, made.segments, made.ambiguous_touches};
-  out.patches.assign(made.patches.data(), made.patches.data() + made.patches.size());
-  std::sort(out.patches.begin(), out.patches.end(),
-            [](const Patch& x, const Patch& y) { return x.key < y.key; });
-  return out;
-}
-
-void expect_same(const PatchesOfPair& x, const PatchesOfPair& y) {
-  EXPECT_EQ(x.segments, y.segments);
-  EXPECT_EQ(x.ambiguous_touches, y.ambiguous_touches);
-  ASSERT_EQ(x.patches.size(), y.patches.size());
-  for (std::size_t i = 0; i < x.patches.size(); ++i) {
-    const Patch &p = x.patches[i], &q = y.patches[i];
-    EXPECT_EQ(p.key, q.key);
-    EXPECT_EQ(std::memcmp(&p.manifold, &q.manifold, sizeof(Manifold)), 0);
-    EXPECT_EQ(std::memcmp(p.point, q.point, p.manifold.point_count * sizeof(ManifoldPoint)), 0);
-  }
-}
-
 // Compares all pairs of bodies by every variant that this machine has. Returns how many patches there are.
 std::size_t compare_variants(std::span<const AssetView> views, std::span<const Instance> posed,
                              const ContactQuery& query) {
-  std::vector<manifold::Shape> shapes;
-  for (const AssetView& view : views)
-    shapes.push_back(
-        manifold::shape_of(view.level(), view.header->lower, view.header->upper, view.header->origin));
-  const std::span<const Contact> contacts = query.rows();
   std::size_t patches = 0;
-  for (std::size_t first = 0, end = 0; first < contacts.size(); first = end) {
-    while (end < contacts.size() && contacts[end].pair == contacts[first].pair) ++end;
-    const ObjectPair pair = query.pairs()[contacts[first].pair];
-    const Instance &a = posed[pair.a], &b = posed[pair.b];
-    const manifold::BodyPair bodies = {{shapes[a.asset], a.pose}, {shapes[b.asset], b.pose}};
-    const auto of_pair = contacts.subspan(first, end - first);
-    const PatchesOfPair plain = patches_of(manifold::OneThread(), bodies, of_pair);
-    patches += plain.patches.size();
-    for (const BlockPairVariant variant : kBlockPairVariants) {
-      const ManifoldLanes* const means = manifold_lanes(variant);
-      if (means == nullptr) continue;
-      SCOPED_TRACE(static_cast<int>(variant));
-      expect_same(plain, patches_of(MeansThread{{}, *means}, bodies, of_pair));
-    }
-  }
+  for_each_pair(views, posed, query,
+                [&](const manifold::BodyPair& bodies, std::span<const Contact> contacts) {
+                  const PatchesOfPair plain = patches_of(manifold::OneThread(), bodies, contacts);
+                  patches += plain.patches.size();
+                  for (const BlockPairVariant variant : kBlockPairVariants) {
+                    const ManifoldLanes* const means = manifold_lanes(variant);
+                    if (means == nullptr) continue;
+                    SCOPED_TRACE(static_cast<int>(variant));
+                    expect_same(plain, patches_of(MeansThread{{}, *means}, bodies, contacts));
+                  }
+                });
   return patches;
 }
 

@@ -29,7 +29,7 @@ class HostQuestions {
   FoundManifolds manifolds(const PosedList& bodies, const PairList& pairs) {
     place(bodies, nullptr);
     require(contacts_.find(scene_, {pairs.pairs, std::min(*pairs.count, pairs.most)}, {}), scene_);
-    require(manifolds_.find(scene_, contacts_, {.match_previous = false}), scene_);
+    require(manifolds_.find(scene_, contacts_, kManifoldsOfStep), scene_);
     manifold_count_ = static_cast<std::uint32_t>(manifolds_.rows().size());
     point_count_ = static_cast<std::uint32_t>(manifolds_.points().size());
     return {manifolds_.rows().data(), manifolds_.points().data(), &manifold_count_, &point_count_,

@@ -349,6 +349,16 @@ TANDEM_HD inline void walk_line(const LineQuestions& questions, std::uint32_t qu
   }
 }
 
+/// Answers a question, if it is asked, by one thread.
+TANDEM_HD inline void answer_line(const LineQuestions& questions, std::uint32_t question) {
+  if (questions.questions()[question].side < 0) return;
+  questions.prepare(question);
+  walk_line(questions, question);
+  if (!questions.has_to_look_further(question)) return;
+  questions.look_further(question);
+  walk_line(questions, question);
+}
+
 /// Answers the first `count` questions about lines; those of no side are not asked. All of the team see them.
 template <typename Team>
 TANDEM_HD void walk_lines(const Team& team, const LineQuestions& questions, std::uint32_t count) {
@@ -357,14 +367,7 @@ TANDEM_HD void walk_lines(const Team& team, const LineQuestions& questions, std:
   } else if constexpr (HasWarps<Team>) {
     team.walk_lines(questions, count);
   } else {
-    for (std::uint32_t i = 0; i < count; ++i) {
-      if (questions.questions()[i].side < 0) continue;
-      questions.prepare(i);
-      walk_line(questions, i);
-      if (!questions.has_to_look_further(i)) continue;
-      questions.look_further(i);
-      walk_line(questions, i);
-    }
+    for (std::uint32_t i = 0; i < count; ++i) answer_line(questions, i);
   }
 }
 

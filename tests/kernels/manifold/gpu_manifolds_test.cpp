@@ -182,7 +182,7 @@ TEST_F(GpuManifolds, OfPairsWithManyContacts) {
   }
 }
 
-/// So many that warps go in step.
+/// There are so many pairs that warps go in step.
 TEST_F(GpuManifolds, OfManyPairs) {
   constexpr std::uint32_t kBodies = 20'000;
   const BodyScene scene = boxes(kBodies, 0.3, 61);

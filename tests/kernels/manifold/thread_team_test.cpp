@@ -17,7 +17,7 @@
 namespace tandem::test {
 namespace {
 
-/// Where several threads wait for each other, and tell each other something.
+/// Several threads wait here for each other, and tell each other something.
 class Meeting {
  public:
   explicit Meeting(std::uint32_t threads) : barrier_(threads), told_(threads), line_(threads) {}
@@ -29,30 +29,28 @@ class Meeting {
     if (line_[rank] != line_[0]) ++strays_;
     barrier_.arrive_and_wait();
   }
-  /// Returns of(...) of what all tell.
-  template <typename T, typename Of>
-  T gather(std::uint32_t rank, T value, const std::source_location& from, const Of& of) {
+  /// Tells the others a value. Result: read(said), where said(i) is what thread i tells.
+  template <typename T, typename Read>
+  T exchange(std::uint32_t rank, T value, const std::source_location& from, const Read& read) {
     static_assert(sizeof(T) <= sizeof(std::uint64_t));
     std::memcpy(&told_[rank], &value, sizeof value);
     wait(rank, from);
-    const auto said = [&](std::size_t i) {
-      T out;
-      std::memcpy(&out, &told_[i], sizeof out);
-      return out;
-    };
-    T out = said(0);
-    for (std::size_t i = 1; i < told_.size(); ++i) out = of(out, said(i));
+    const T out = read([&](std::size_t i) {
+      T said;
+      std::memcpy(&said, &told_[i], sizeof said);
+      return said;
+    });
     wait(rank, from);
     return out;
   }
-  template <typename T>
-  T told_by(std::uint32_t rank, T value, std::uint32_t of, const std::source_location& from) {
-    std::memcpy(&told_[rank], &value, sizeof value);
-    wait(rank, from);
-    T out;
-    std::memcpy(&out, &told_[of], sizeof out);
-    wait(rank, from);
-    return out;
+  /// Returns of(...) of what all tell.
+  template <typename T, typename Of>
+  T gather(std::uint32_t rank, T value, const std::source_location& from, const Of& of) {
+    return exchange(rank, value, from, [&](const auto& said) {
+      T out = said(0);
+      for (std::size_t i = 1; i < told_.size(); ++i) out = of(out, said(i));
+      return out;
+    });
   }
   int strays() const { return strays_; }
 
@@ -138,19 +136,12 @@ class ThreadTeam {
   }
   template <typename T>
   T from_lane(T value, std::uint32_t of, Here from = Here::current()) const {
-    return warp().told_by(lane(), value, of, from);
+    return warp().exchange(lane(), value, from, [&](const auto& said) { return said(of); });
   }
   void walk_lines(const manifold::LineQuestions& questions, std::uint32_t count,
                   Here from = Here::current()) const {
     sync(from);
-    for (std::uint32_t i = rank_; i < count; i += size_) {
-      if (questions.questions()[i].side < 0) continue;
-      questions.prepare(i);
-      manifold::walk_line(questions, i);
-      if (!questions.has_to_look_further(i)) continue;
-      questions.look_further(i);
-      manifold::walk_line(questions, i);
-    }
+    for (std::uint32_t i = rank_; i < count; i += size_) manifold::answer_line(questions, i);
     sync(from);
   }
 

@@ -195,20 +195,25 @@ TANDEM_HD inline void work_on(BodyWork work, float h, const SoftMotion& gain, So
   }
 }
 
-/// Gives a body the state at the end of the step. velocity, moved: what the step has added.
+/// Gives a body the state at the end of the step. velocity, moved: what the step has added. part: of what
+/// contacts added to the velocity; see ContactWork.
 TANDEM_HD inline void end_step(const BodyProperties& properties, const SteppedBody& body,
-                               const SoftMotion& velocity, const SoftMotion& moved, double dt,
+                               const SoftMotion& velocity, const SoftMotion& moved, double part, double dt,
                                BodyState& state) {
-  apply_motion(properties, body.scale, body.velocity + added_motion(body.scale, velocity),
-               dt * body.velocity + added_motion(body.scale, moved), dt, state);
+  Vector6 end = body.velocity + added_motion(body.scale, velocity);
+  if (part < 1) {
+    const Vector6 free = body.velocity + dt * body.gravity;
+    end = free + part * (end - free);
+  }
+  apply_motion(properties, body.scale, end, dt * body.velocity + added_motion(body.scale, moved), dt, state);
 }
 
-/// Writes the impulses of a pair's contacts. impulses, done: of all contacts; see StepSolver and StepInput;
-/// done: null where nobody asks.
+/// Writes the impulses of a pair's contacts. part: of them, see end_step(). impulses, done: of all contacts;
+/// see StepSolver and StepInput; done: null where nobody asks.
 TANDEM_HD inline void write_pair(const SoftNumbers& step, double unit_root, const ContactRange& contacts,
-                                 const SoftRows& rows, std::uint32_t group, int lane,
+                                 const SoftRows& rows, std::uint32_t group, int lane, double part,
                                  ContactImpulse* impulses, ContactImpulse* done) {
-  const double unit = unit_root * unit_root, substeps = step.substeps * unit;
+  const double unit = part * (unit_root * unit_root), substeps = step.substeps * unit;
   const SoftNumber(&turns)[3] = rows.turnings[group].impulse;
   const auto of = [&](const SoftNumber& number) { return unsigned_zero(number.of[lane]); };
   const Vector3 turning = {of(turns[0]), of(turns[1]), of(turns[2])};

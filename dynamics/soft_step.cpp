@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "dynamics/contact_work.h"
 #include "dynamics/phases.h"
 #include "kernels/common/lane_variant.h"
 
@@ -33,6 +34,7 @@ Residual SoftSolver::solve(const StepInput& input, std::span<const std::uint32_t
   fill(step);
   joints_.start(input, islands, states, place_, bodies_, step.numbers, unit_root_);
   run(step);
+  limit_work(step, islands);
   write(step, states, impulses);
   joints_.write(input.joint_memory);
   return residual();
@@ -265,17 +267,43 @@ void SoftSolver::work_on_joints(Work work, double time) {
   joints_.visit(velocities_, true);
 }
 
+// Finds which part of their impulses bodies get, so that contacts add no energy to an island. Joints, and
+// kinematic bodies that touch others, may.
+void SoftSolver::limit_work(const Step& step, std::span<const std::uint32_t> islands) {
+  const StepInput& input = step.input;
+  part_.assign(body_.size(), 1);
+  const auto is_kinematic = [&](std::uint32_t body) {
+    return input.bodies[body].motion == Motion::kinematic;
+  };
+  for (const std::uint32_t island : islands) {
+    if (!input.islands.joints_of(island).empty()) continue;
+    ContactWork work;
+    for (const std::uint32_t i : input.islands.contacts_of(island)) {
+      if (is_kinematic(input.contacts[i].body_a) || is_kinematic(input.contacts[i].body_b)) work.note_drive();
+    }
+    const auto visit = [&](void (ContactWork::*add)(const WorkOnBody&)) {
+      for (const std::uint32_t body : input.islands.bodies_of(island)) {
+        const std::uint32_t i = place_[body];
+        (work.*add)(work_on_body(bodies_[i], velocities_[i], input.dt));
+      }
+    };
+    visit(&ContactWork::note), visit(&ContactWork::add);
+    for (const std::uint32_t body : input.islands.bodies_of(island)) part_[place_[body]] = work.part();
+  }
+}
+
 void SoftSolver::write(const Step& step, std::span<BodyState> states, std::span<ContactImpulse> impulses) {
   step.input.threads.for_parts(body_.size() - 1, kBodiesAtOnce, [&](std::size_t before) {
     const std::size_t i = before + 1;
-    end_step(step.input.bodies[body_[i]], bodies_[i], velocities_[i], moved_[i], step.input.dt,
+    end_step(step.input.bodies[body_[i]], bodies_[i], velocities_[i], moved_[i], part_[i], step.input.dt,
              states[body_[i]]);
   });
   const SoftRows rows = rows_of(step);
   ContactImpulse* const done = step.input.done.empty() ? nullptr : step.input.done.data();
   step.input.threads.for_parts(pairs_.size(), kBodiesAtOnce, [&](std::size_t k) {
     const Pair& pair = pairs_[k];
-    write_pair(step.numbers, unit_root_, pair.contacts, rows, pair.group, pair.lane, impulses.data(), done);
+    write_pair(step.numbers, unit_root_, pair.contacts, rows, pair.group, pair.lane,
+               part_[pair.a != 0 ? pair.a : pair.b], impulses.data(), done);
   });
 }
 

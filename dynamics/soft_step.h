@@ -65,6 +65,7 @@ class SoftSolver {
   SoftRows rows_of(const Step& step);
   void run(const Step& step);
   void work_on_joints(Work work, double time);
+  void limit_work(const Step& step, std::span<const std::uint32_t> islands);
   void write(const Step& step, std::span<BodyState> states, std::span<ContactImpulse> impulses);
   Residual residual() const;
 
@@ -87,6 +88,7 @@ class SoftSolver {
   std::vector<SoftGap> gaps_;
   std::vector<SoftFriction> frictions_;
   std::vector<SoftMotion> velocities_, moved_;  // what the step adds to the motion of its start
+  std::vector<double> part_;                    // of their impulses, of each body
   std::vector<SoftMotion> gains_, start_;  // what a substep adds to each; the velocities without its contacts
 };
 

@@ -4,8 +4,10 @@
 #include <optional>
 #include <span>
 
+#include "dynamics/contact_work.h"
 #include "dynamics/parallel/cluster_sweeps.h"
 #include "dynamics/parallel/joint_step.h"
+#include "dynamics/parallel/labels.h"
 #include "dynamics/parallel/pair_groups.h"
 #include "dynamics/parallel/soft_sweeps.h"
 
@@ -77,11 +79,17 @@ struct SoftStepView {
   SteppedBody* bodies;
   SoftTurns* turns;
   std::uint32_t* bounces;
+  std::uint32_t* label;  ///< of each body; see labels.h
+  ContactWork* work;     ///< of the island whose first body it is
 
   TANDEM_HD double unit_root() const { return unit_root_of(groups.colouring.numbers->most_mass); }
   TANDEM_HD bool is_held(std::uint32_t body) const {
     return groups.colouring.pairs_of[body] > 0 ||
            (input.bodies[body].motion == Motion::moving && input.joints.hold(body));
+  }
+  TANDEM_HD ContactWork& work_of(std::uint32_t body) const { return work[first_of(label, body)]; }
+  TANDEM_HD WorkOnBody work_on(std::uint32_t body) const {
+    return work_on_body(bodies[body], motion_of(sweeps.velocities[body]), input.dt);
   }
   TANDEM_HD JointSweeps joints() const {
     return {input.joints, SoftJointNumbers(numbers), input.bodies, input.states,
@@ -94,6 +102,7 @@ namespace soft_step_detail {
 TANDEM_HD inline void fill_body(const SoftStepView& view, std::uint32_t i) {
   if (i == 0) *view.bounces = 0, *view.sweeps.arrived = 0, *view.sweeps.is_done = 0;
   view.sweeps.velocities[i] = {}, view.sweeps.moved[i] = {};
+  view.label[i] = i, view.work[i] = {};
   if (!view.is_held(i)) return;
   view.bodies[i] = soft_body(view.numbers, view.unit_root(), i);
   view.sweeps.gains[i] = gain_of(view.bodies[i], view.numbers.h);
@@ -146,6 +155,33 @@ TANDEM_HD inline void fill_lane(const SoftStepView& view, std::uint32_t i) {
   }
 }
 
+TANDEM_HD inline void join_pair(const SoftStepView& view, std::uint32_t i) {
+  const ContactPair& pair = view.groups.colouring.pairs.pairs[i];
+  if (view.groups.colouring.pairs.is_moved(pair.a) && view.groups.colouring.pairs.is_moved(pair.b))
+    join(view.label, pair.a, pair.b);
+}
+
+// Joints, and kinematic bodies that touch others, may add energy to an island.
+TANDEM_HD inline void note_drive(const SoftStepView& view, std::uint32_t i) {
+  const ContactPair& pair = view.groups.colouring.pairs.pairs[i];
+  for (int side = 0; side < 2; ++side) {
+    if (view.input.bodies[pair.body(side)].motion == Motion::kinematic)
+      view.work_of(pair.body(1 - side)).note_drive();
+  }
+}
+
+TANDEM_HD inline void note_work(const SoftStepView& view, std::uint32_t i) {
+  if (!view.is_held(i)) return;
+  view.label[i] = first_of(view.label, i);
+  if (view.input.bodies[i].motion == Motion::moving && view.input.joints.hold(i))
+    view.work_of(i).note_drive();
+  view.work_of(i).note(view.work_on(i));
+}
+
+TANDEM_HD inline void add_work(const SoftStepView& view, std::uint32_t i) {
+  if (view.is_held(i)) view.work_of(i).add(view.work_on(i));
+}
+
 TANDEM_HD inline void end_body(const SoftStepView& view, std::uint32_t i) {
   if (view.groups.needs->has_room == 0) return;
   if (view.input.is_solved != nullptr && view.input.is_solved[i] != 0) return;
@@ -153,7 +189,7 @@ TANDEM_HD inline void end_body(const SoftStepView& view, std::uint32_t i) {
   BodyState state = view.input.states[i];
   if (view.is_held(i))
     end_step(body, view.bodies[i], motion_of(view.sweeps.velocities[i]), motion_of(view.sweeps.moved[i]),
-             view.input.dt, state);
+             view.work_of(i).part(), view.input.dt, state);
   else if (body.motion == Motion::moving)
     fly(body, view.input.pulls[i], view.input.dt, state);
   else if (body.motion == Motion::kinematic)
@@ -165,8 +201,9 @@ TANDEM_HD inline void end_lane(const SoftStepView& view, std::uint32_t i) {
   const std::uint32_t group = i / kSoftWidth, lane = i % kSoftWidth;
   if (lane >= view.sweeps.rows.pairs[group].pairs) return;
   const ContactPair& pair = view.groups.colouring.pairs.pairs[view.groups.pair_of[i]];
+  const std::uint32_t moved = view.groups.colouring.pairs.is_moved(pair.a) ? pair.a : pair.b;
   write_pair(view.numbers, view.unit_root(), pair.contacts(), view.sweeps.rows, group, static_cast<int>(lane),
-             view.output.impulses, view.output.done);
+             view.work_of(moved).part(), view.output.impulses, view.output.done);
 }
 
 }  // namespace soft_step_detail
@@ -192,6 +229,7 @@ class ParallelSoftStep {
     take(moved_.reserve(room_.bodies)), take(bounces_.reserve(1)), take(arrived_.reserve(1)),
         take(is_done_.reserve(1));
     take(groups_.reserve(room_.groups)), take(turnings_.reserve(room_.groups));
+    take(labels_.reserve(room_.bodies)), take(works_.reserve(room_.bodies));
     take(turns_.reserve(room_.groups)), take(normals_.reserve(room_.rows));
     take(gaps_.reserve(room_.rows)), take(frictions_.reserve(room_.rows));
     return status;
@@ -199,7 +237,7 @@ class ParallelSoftStep {
   const SoftStepRoom& room() const { return room_; }
   std::size_t bytes() const {
     return bytes_of(colouring_, grouping_, bodies_, gains_, starts_, velocities_, moved_, bounces_, arrived_,
-                    is_done_, groups_, turnings_, turns_, normals_, gaps_, frictions_);
+                    is_done_, groups_, turnings_, turns_, normals_, gaps_, frictions_, labels_, works_);
   }
 
   /// What the last step needed room for, in the executor's memory. Where it had too little it has written
@@ -249,6 +287,11 @@ class ParallelSoftStep {
   void write(Executor& executor) {
     using namespace soft_step_detail;
     const SoftStepView view = *view_;
+    const ContactPairs& pairs = view.groups.colouring.pairs;
+    executor.for_each(pairs.count, pairs.most, [=] TANDEM_HD(std::uint32_t i) { join_pair(view, i); });
+    executor.for_each(pairs.count, pairs.most, [=] TANDEM_HD(std::uint32_t i) { note_drive(view, i); });
+    executor.for_each(nullptr, view.input.body_count, [=] TANDEM_HD(std::uint32_t i) { note_work(view, i); });
+    executor.for_each(nullptr, view.input.body_count, [=] TANDEM_HD(std::uint32_t i) { add_work(view, i); });
     executor.for_each(nullptr, view.input.body_count, [=] TANDEM_HD(std::uint32_t i) { end_body(view, i); });
     executor.for_each(view.groups.lanes, kSoftWidth * room_.groups,
                       [=] TANDEM_HD(std::uint32_t i) { end_lane(view, i); });
@@ -301,7 +344,9 @@ class ParallelSoftStep {
             output,
             bodies_.data(),
             turns_.data(),
-            bounces_.data()};
+            bounces_.data(),
+            labels_.data(),
+            works_.data()};
   }
 
   template <typename T>
@@ -314,7 +359,8 @@ class ParallelSoftStep {
   Array<SteppedBody> bodies_;
   Array<SoftMotion> gains_, starts_;
   Array<SharedMotion> velocities_, moved_;
-  Array<std::uint32_t> bounces_, arrived_, is_done_;
+  Array<std::uint32_t> bounces_, arrived_, is_done_, labels_;
+  Array<ContactWork> works_;
   Array<SoftPairs> groups_;
   Array<SoftTurning> turnings_;
   Array<SoftTurns> turns_;

@@ -104,6 +104,20 @@ inline RandomHeap sparse_heap(unsigned seed, SolverKind kind) {
   return heap;
 }
 
+/// Returns balls that are so deep in each other that few substeps are far from impulses that part them, in
+/// islands of some bodies. what_drives: motion of the bodies that contacts do not move.
+inline RandomHeap wedged_heap(unsigned seed, Motion what_drives) {
+  RandomHeap heap({.bodies = 150, .pairs = 90, .seed = seed});
+  heap.options.substeps = 4;
+  for (BodyProperties& body : heap.bodies) {
+    if (body.motion != Motion::moving) body.motion = what_drives;
+    body.inertia = 0.3 * body.mass * Matrix3::identity(), body.inverse_inertia = inverse(body.inertia);
+  }
+  for (ContactPoint& contact : heap.contacts) contact.depth *= 50;
+  for (Pull& pull : heap.pulls) pull = {{0, 0, -9.81}, {}};
+  return heap;
+}
+
 /// Returns boxes on each other on a fixed one, the last of 10,000 kg and the others of 1 kg. Two that touch
 /// do so by four corners.
 inline RandomHeap tower(std::uint32_t boxes) {

@@ -9,6 +9,7 @@
 #include <set>
 
 #include "dynamics/phases.h"
+#include "dynamics/random_heap.h"
 
 namespace tandem::dynamics {
 namespace {
@@ -240,6 +241,42 @@ TEST(SoftSolver, GivesTheSameBytesByAnyNumberOfThreads) {
   for (const std::uint32_t threads : {2u, 3u, 8u}) expect_same(cube.solved(threads), alone, "states");
   EXPECT_TRUE(std::ranges::all_of(alone, is_usable));
   EXPECT_NE(norm(alone[1].velocity - cube.states[1].velocity), 0);
+}
+
+// Returns the energy of an island of balls after a step, over that after a step without contacts.
+double energy_by_contacts(const RandomHeap& heap, const HeapResult& result,
+                          std::span<const std::uint32_t> bodies) {
+  double with = 0, without = 0;
+  for (const std::uint32_t i : bodies) {
+    BodyState free = heap.states[i];
+    free.velocity += heap.dt * heap.pulls[i].linear;
+    with += kinetic_energy(heap.bodies[i], result.states[i]);
+    without += kinetic_energy(heap.bodies[i], free);
+  }
+  return with / without;
+}
+
+TEST(SoftSolver, ContactsAddEnergyOnlyWhereSomethingDrivesBodies) {
+  constexpr double kRounding = 1e-9;
+  for (const Motion what_drives : {Motion::fixed, Motion::kinematic}) {
+    int limited = 0, more = 0;
+    for (unsigned seed = 1; seed <= 20; ++seed) {
+      const RandomHeap heap = wedged_heap(seed, what_drives);
+      const HeapResult result = solution(heap);
+      const Islands islands = find_islands(heap.bodies, heap.contacts);
+      for (std::size_t island = 0; island < islands.size(); ++island) {
+        if (islands.flies(island)) continue;
+        const double energy = energy_by_contacts(heap, result, islands.bodies_of(island));
+        more += energy > 1 + kRounding ? 1 : 0;
+        limited += std::fabs(energy - 1) <= kRounding ? 1 : 0;
+      }
+    }
+    EXPECT_GT(limited, 20);
+    if (what_drives == Motion::fixed)
+      EXPECT_EQ(more, 0);
+    else
+      EXPECT_GT(more, 20);
+  }
 }
 
 TEST(Phases, EachBeginsWhenTheOneBeforeIsDone) {

@@ -37,8 +37,7 @@ void expect_same(const HeapResult& is, const HeapResult& wanted) {
   }
 }
 
-void expect_same_as_soft_solver(const HeapOptions& options) {
-  const RandomHeap heap(options);
+void expect_same_as_soft_solver(const RandomHeap& heap) {
   GpuHeap gpu;
   ASSERT_EQ(gpu.upload(heap, nullptr), Status::kOk);
   HeapResult is;
@@ -50,21 +49,26 @@ void expect_same_as_soft_solver(const HeapOptions& options) {
 TEST_F(GpuSoftStep, GivesTheVelocitiesAndImpulsesOfSoftSolver) {
   for (unsigned seed = 1; seed <= 6; ++seed) {
     SCOPED_TRACE(seed);
-    expect_same_as_soft_solver({.bodies = 40 + 60 * seed, .pairs = 150 * seed, .seed = seed});
+    expect_same_as_soft_solver(RandomHeap({.bodies = 40 + 60 * seed, .pairs = 150 * seed, .seed = seed}));
   }
 }
 
 TEST_F(GpuSoftStep, TakesMorePairsThanItHasLanes) {
-  expect_same_as_soft_solver({.bodies = 100000, .pairs = 300000, .is_near = true});
+  expect_same_as_soft_solver(RandomHeap({.bodies = 100000, .pairs = 300000, .is_near = true}));
+}
+
+TEST_F(GpuSoftStep, LimitsTheEnergyThatContactsAdd) {
+  for (const Motion what_drives : {Motion::fixed, Motion::kinematic})
+    expect_same_as_soft_solver(wedged_heap(3, what_drives));
 }
 
 TEST_F(GpuSoftStep, ABodyMayTouchMoreOthersThanThereAreSharedColours) {
-  expect_same_as_soft_solver({.bodies = 500, .pairs = 700, .most_contacts = 3, .hub = 400});
+  expect_same_as_soft_solver(RandomHeap({.bodies = 500, .pairs = 700, .most_contacts = 3, .hub = 400}));
 }
 
 TEST_F(GpuSoftStep, MovesBodiesThatTouchNothing) {
-  expect_same_as_soft_solver({.bodies = 100, .pairs = 0});
-  expect_same_as_soft_solver({.bodies = 100, .pairs = 3});
+  expect_same_as_soft_solver(RandomHeap({.bodies = 100, .pairs = 0}));
+  expect_same_as_soft_solver(RandomHeap({.bodies = 100, .pairs = 3}));
 }
 
 TEST_F(GpuSoftStep, CanBeCapturedInAGraph) {

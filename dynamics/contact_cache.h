@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "dynamics/remembered_contacts.h"
+#include "dynamics/threads.h"
 #include "tandem/kernels/object_pair.h"
 
 namespace tandem::dynamics {
@@ -31,14 +32,15 @@ class ContactCache {
   ///
   /// Pairs of two idle bodies stay remembered and are left out. Conditions: found comes by ascending pair;
   /// kept is ascending.
-  void update(std::span<const ContactPoint> found, std::span<const ObjectPair> kept, const BodiesAhead& of);
+  void update(std::span<const ContactPoint> found, std::span<const ObjectPair> kept, const BodiesAhead& of,
+              Threads& threads);
 
   /// Does what update() does, of what was remembered when it was last called.
   void update_again(std::span<const ContactPoint> found, std::span<const ObjectPair> kept,
-                    const BodiesAhead& of);
+                    const BodiesAhead& of, Threads& threads);
 
   /// Returns the contacts of the step that update() was last called for, by ascending pair.
-  std::span<const ContactPoint> contacts() const { return contacts_; }
+  std::span<const ContactPoint> contacts() const { return made_.contacts; }
 
   /// Returns whether no contact had been remembered before.
   bool is_cold() const { return is_cold_; }
@@ -49,20 +51,31 @@ class ContactCache {
   /// Takes what the contacts did. Condition: one for each.
   void remember(std::span<const ContactImpulse> impulses);
 
-  std::span<const CachedContact> entries() const { return entries_; }
+  std::span<const CachedContact> entries() const { return made_.entries; }
 
   /// Remembers these contacts instead. contacts() are none until the next update().
   void restore(std::vector<CachedContact> entries);
 
  private:
-  // Makes room behind what there is, and takes what `make` says that it made there of a pair's contacts.
-  template <typename Make>
-  void add(std::size_t room, const Make& make);
+  /// What update() makes of the contacts of some pairs.
+  struct Made {
+    std::vector<CachedContact> entries;  // by ascending pair
+    std::vector<ContactPoint> contacts;
+    std::vector<std::uint32_t> place;  // of each contact in entries
+    std::vector<std::uint8_t> marks;   // for one pair
 
-  std::vector<CachedContact> entries_, before_;  // by ascending pair; before_: until update()
-  std::vector<ContactPoint> contacts_;
-  std::vector<std::uint32_t> place_;  // of each contact in entries_
-  std::vector<std::uint8_t> marks_;   // for one pair
+    void make(std::span<const CachedContact> rest, std::span<const ContactPoint> found,
+              std::span<const ObjectPair> kept, const BodiesAhead& of);
+    // Makes room behind what there is, and takes what `make` says that it made there of a pair's contacts.
+    template <typename Make>
+    void add(std::size_t room, const Make& make);
+    void resize(std::size_t entry_count, std::size_t contact_count);
+  };
+  void join_parts(Threads& threads);
+
+  Made made_;
+  std::vector<Made> parts_;
+  std::vector<CachedContact> before_;  // the entries until update()
   bool is_cold_ = true;
 };
 

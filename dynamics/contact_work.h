@@ -8,8 +8,8 @@
 namespace tandem::dynamics {
 
 /// What contacts do to the energy of a body in a soft step. Let y0 be the velocity that the body would end
-/// with if nothing touched it, and d what contacts add to it, in coordinates where |y|^2 / 2 is the energy. The
-/// part s of d changes the energy by s y0.d + s^2 |d|^2 / 2.
+/// with if nothing touched it, and d what contacts add to it, in coordinates where |y|^2 / 2 is the energy.
+/// The part s of d changes the energy by s y0.d + s^2 |d|^2 / 2.
 struct WorkOnBody {
   double along;   ///< y0.d
   double square;  ///< |d|^2 / 2
@@ -31,8 +31,8 @@ TANDEM_HD inline WorkOnBody work_on_body(const SteppedBody& body, const SoftMoti
 /// with may, where it is far from the solution: bodies that are wedged between others got speeds of 2 m/s. So
 /// it takes only the part of them that adds none.
 ///
-/// First note() the work on all bodies, then add() it. The bytes do not depend on the order, since the sums are
-/// of whole numbers, multiples of 2^-38 of the largest term: up to 2^24 bodies fit.
+/// First note() the work on all bodies, then add() it. The bytes do not depend on the order, since the sums
+/// are of whole numbers, multiples of 2^-38 of the largest term: up to 2^24 bodies fit.
 struct ContactWork {
   double largest = 0;  ///< infinite: something drives the bodies, so that their energy may grow
   std::uint64_t along = 0, square = 0;
@@ -45,8 +45,8 @@ struct ContactWork {
     std::frexp(largest, &exponent);
     const auto add_to = [&](std::uint64_t& sum, double term) {
       constexpr int kBits = 38;
-      atomic_add(sum, static_cast<std::uint64_t>(
-                          static_cast<std::int64_t>(std::ldexp(term, kBits - exponent))));
+      atomic_add(sum,
+                 static_cast<std::uint64_t>(static_cast<std::int64_t>(std::ldexp(term, kBits - exponent))));
     };
     add_to(along, work.along), add_to(square, work.square);
   }

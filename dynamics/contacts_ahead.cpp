@@ -7,11 +7,17 @@
 #include "kernels/common/stopwatch.h"
 
 namespace tandem::dynamics {
-ContactsAhead::ContactsAhead(std::span<const AssetView> assets, std::uint32_t threads,
+namespace {
+
+constexpr std::size_t kPairsAtOnce = 256;  // that a thread takes
+
+}  // namespace
+
+ContactsAhead::ContactsAhead(std::span<const AssetView> assets, const Threads& threads,
                              const PairFilter* filter)
-    : filter_(filter), inner_radius_(inner_radii(assets)) {
+    : filter_(filter), threads_(threads), inner_radius_(inner_radii(assets)) {
   for (Scene* scene : {&scene_, &moved_}) {
-    require(scene->set_threads(threads), *scene);
+    threads_.work_for(*scene);
     require(scene->set_assets(assets), *scene);
   }
 }
@@ -24,16 +30,20 @@ void ContactsAhead::find_near(const BodiesAhead& of) {
   auto before = apart_.begin();
   for (const ObjectPair& pair : scene_.pairs()) {
     while (before != apart_.end() && before->pair < pair) ++before;
-    Apart& now = now_apart_.emplace_back(Apart{{pair}});
-    if (before != apart_.end() && before->pair == pair)
-      now.distance = before->distance - between(pair) * (1 + 1e-9);
-    now.distance = std::max(now.distance, least_distance(of, pair));
-    const PairReach reach = reach_of(of, pair, now.distance);
-    now.reach = reach.reach, now.asked = reach.asked, now.slow = reach.is_slow;
-    if (reach.is_near && reach.is_slow) slow_.push_back(pair);
-    if (reach.is_fast) fast_.push_back(pair);
+    const bool is_known = before != apart_.end() && before->pair == pair;
+    now_apart_.push_back({{pair, is_known ? before->distance : 0}, {}});
   }
   apart_.swap(now_apart_);
+  threads_.for_parts(apart_.size(), kPairsAtOnce, [&](std::size_t i) {
+    Apart& now = apart_[i];
+    if (now.distance > 0) now.distance -= between(now.pair) * (1 + 1e-9);
+    now.distance = std::max(now.distance, least_distance(of, now.pair));
+    now.reach = reach_of(of, now.pair, now.distance);
+  });
+  for (const Apart& apart : apart_) {
+    if (apart.reach.is_near && apart.reach.is_slow) slow_.push_back(apart.pair);
+    if (apart.reach.is_fast) fast_.push_back(apart.pair);
+  }
 }
 
 std::span<const ObjectPair> ContactsAhead::find_in_middle(std::span<const CachedContact> remembered,
@@ -79,7 +89,7 @@ AheadState ContactsAhead::save() const {
 void ContactsAhead::restore(AheadState state) {
   before_ = std::move(state.before);
   apart_.clear();
-  for (const PairApart& apart : state.apart) apart_.push_back({apart});
+  for (const PairApart& apart : state.apart) apart_.push_back({apart, {}});
 }
 
 void ContactsAhead::place(const BodiesAhead& of) {
@@ -130,8 +140,8 @@ void ContactsAhead::find_approaches(std::span<const ContactPoint> found, std::sp
     if (contact != found.end() && pair_of(*contact) == apart.pair) continue;
     while (known != kept.end() && *known < apart.pair) ++known;
     if (known != kept.end() && *known == apart.pair) continue;
-    if (apart.distance > apart.reach) continue;
-    pairs_.push_back(apart.pair), places_.push_back(i), reaches_.push_back(apart.asked);
+    if (apart.distance > apart.reach.reach) continue;
+    pairs_.push_back(apart.pair), places_.push_back(i), reaches_.push_back(apart.reach.asked);
   }
   if (pairs_.empty()) return;
   require(distances_.find(scene_, pairs_, {.tolerance = distance_tolerance(of), .reach_of_pair = reaches_}),
@@ -191,7 +201,7 @@ void ContactsAhead::find_surprised(std::span<const ContactPoint> known, const Bo
     bool touches = false;
     for (; !known.empty() && pair_of(known.front()) <= pair; known = known.subspan(1))
       touches = touches || (pair_of(known.front()) == pair && known.front().depth >= 0);
-    if (touches || !apart.slow) continue;
+    if (touches || !apart.reach.is_slow) continue;
     if (between(pair) > std::max(0.0, apart.distance) + start.slop) pairs_.push_back(pair);
   }
 }

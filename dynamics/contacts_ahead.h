@@ -4,6 +4,7 @@
 
 #include "dynamics/contact_finder.h"
 #include "dynamics/pair_ahead.h"
+#include "dynamics/threads.h"
 #include "tandem/kernels/distance_query.h"
 
 namespace tandem::dynamics {
@@ -30,7 +31,8 @@ class ContactsAhead {
  public:
   /// What the assets and the filter look at, and the filter, must outlive this. filter: or null; its motions
   /// are not looked at, and what it excludes may change between calls. Throws QueryFailed.
-  ContactsAhead(std::span<const AssetView> assets, std::uint32_t threads, const PairFilter* filter = nullptr);
+  ContactsAhead(std::span<const AssetView> assets, const Threads& threads,
+                const PairFilter* filter = nullptr);
 
   /// Finds which bodies are near each other. Throws QueryFailed.
   void find_near(const BodiesAhead& of);
@@ -74,8 +76,7 @@ class ContactsAhead {
 
  private:
   struct Apart : PairApart {
-    double reach = 0, asked = 0;  ///< see PairReach
-    bool slow = false;
+    PairReach reach;
   };
   void place(const BodiesAhead& of);
   void follow(const BodiesAhead& of);
@@ -94,6 +95,7 @@ class ContactsAhead {
   static void add_points(const std::vector<ContactPoint>& points, std::vector<ContactPoint>& found);
 
   const PairFilter* filter_;
+  Threads threads_;
   std::vector<double> inner_radius_;  // of each shape; infinite where it is not closed
   Scene scene_, moved_;               // all bodies; two of each approach, moved
   DistanceQuery distances_;

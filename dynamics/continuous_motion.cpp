@@ -25,10 +25,10 @@ Quaternion turned(const Quaternion& orientation, const Vector3& turn) {
 
 }  // namespace
 
-ContinuousMotion::ContinuousMotion(std::span<const AssetView> shapes, std::uint32_t threads,
+ContinuousMotion::ContinuousMotion(std::span<const AssetView> shapes, const Threads& threads,
                                    const PairFilter* filter)
-    : filter_(filter), inner_radius_(inner_radii(shapes)) {
-  require(moving_.set_threads(threads), moving_);
+    : filter_(filter), threads_(threads), inner_radius_(inner_radii(shapes)) {
+  threads_.work_for(moving_);
   require(moving_.set_assets(shapes), moving_);
   require(two_.set_assets(shapes), two_);
 }

@@ -6,6 +6,7 @@
 
 #include "dynamics/contact_finder.h"
 #include "dynamics/rigid_body.h"
+#include "dynamics/threads.h"
 #include "tandem/kernels/impact_query.h"
 
 namespace tandem::dynamics {
@@ -43,7 +44,7 @@ class ContinuousMotion {
   /// What the shapes and the filter look at, and the filter, must outlive this. filter: names the pairs that
   /// may meet, or null; its motions are not looked at, and what it excludes may change between calls. Throws
   /// QueryFailed where a shape cannot be taken.
-  ContinuousMotion(std::span<const AssetView> shapes, std::uint32_t threads,
+  ContinuousMotion(std::span<const AssetView> shapes, const Threads& threads,
                    const PairFilter* filter = nullptr);
 
   /// Takes back what of the way from `before` to `after` leads through other bodies. joined: the bodies of
@@ -65,6 +66,7 @@ class ContinuousMotion {
                   const ObjectPair& pair, double part);
 
   const PairFilter* filter_;
+  Threads threads_;
   Scene moving_, two_;  // all bodies, and two of them
   ImpactQuery query_;
   ContactQuery contacts_;

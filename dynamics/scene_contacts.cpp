@@ -6,6 +6,7 @@
 #include <new>
 
 #include "kernels/common/stopwatch.h"
+#include "kernels/scene/scene_state.h"
 
 namespace tandem::dynamics {
 
@@ -25,6 +26,11 @@ void take_points(const ManifoldQuery& manifolds, std::span<const ObjectPair> pai
     for (const ManifoldPoint& p : manifolds.points().subspan(manifold.first_point, manifold.point_count))
       points.push_back({pair.a, pair.b, vector_of(p.position), vector_of(p.normal), p.depth, p.id});
   }
+}
+
+void Threads::work_for(Scene& scene) const {
+  require(scene.set_threads(count_), scene);
+  scene.state()->threads = workers_.get();
 }
 
 // Remembered pairs may keep a gap, with which their boxes no longer meet.
@@ -49,9 +55,9 @@ namespace {
 
 class SceneContacts : public ContactFinder {
  public:
-  SceneContacts(std::span<const AssetView> assets, std::uint32_t threads, const PairFilter* filter)
-      : filter_(filter) {
-    require(scene_.set_threads(threads), scene_);
+  SceneContacts(std::span<const AssetView> assets, const Threads& threads, const PairFilter* filter)
+      : filter_(filter), threads_(threads) {
+    threads_.work_for(scene_);
     require(scene_.set_assets(assets), scene_);
   }
 
@@ -83,6 +89,7 @@ class SceneContacts : public ContactFinder {
 
  private:
   const PairFilter* filter_;
+  Threads threads_;
   std::vector<Motion> motion_;
   Scene scene_;
   MovedQuery moved_;
@@ -93,7 +100,7 @@ class SceneContacts : public ContactFinder {
 
 }  // namespace
 
-std::unique_ptr<ContactFinder> make_scene_contacts(std::span<const AssetView> assets, std::uint32_t threads,
+std::unique_ptr<ContactFinder> make_scene_contacts(std::span<const AssetView> assets, const Threads& threads,
                                                    const PairFilter* filter) {
   return std::make_unique<SceneContacts>(assets, threads, filter);
 }

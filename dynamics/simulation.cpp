@@ -56,7 +56,6 @@ Simulation::Simulation(std::vector<BodyProperties> bodies, std::vector<BodyState
       states_(std::move(states)),
       parts_(std::move(parts)),
       options_(options),
-      threads_(options.threads),
       joints_(std::move(parts_.joints)),
       joint_memory_(joints_.size()) {
   find_joined();
@@ -116,7 +115,7 @@ void Simulation::find_contacts(StepRecord& record) {
   if (parts_.ahead) parts_.ahead->add_to(found_, parts_.contacts->kept(), ahead);
   drop_contacts_of_fixed();
   kept_.assign(parts_.contacts->kept().begin(), parts_.contacts->kept().end());
-  cache_.update(found_, kept_, ahead);
+  cache_.update(found_, kept_, ahead, options_.threads);
   record.generation += stopwatch.lap();
   record.contacts = cache_.contacts().size();
   for (const ContactPoint& contact : cache_.contacts()) {
@@ -169,7 +168,7 @@ std::vector<ContactImpulse> Simulation::solve_contacts() {
                        islands_,
                        step_,
                        cache_.is_cold(),
-                       threads_,
+                       options_.threads,
                        joints_,
                        joint_memory_,
                        done_,
@@ -187,7 +186,7 @@ bool Simulation::find_missed(std::span<const BodyState> before) {
       parts_.ahead->add_missed(found_, cache_.contacts(), start, states_);
   if (missed.empty()) return false;
   std::erase_if(kept_, [&](const ObjectPair& pair) { return std::ranges::binary_search(missed, pair); });
-  cache_.update_again(found_, kept_, start);
+  cache_.update_again(found_, kept_, start, options_.threads);
   return true;
 }
 

@@ -44,7 +44,7 @@ struct SimulationOptions {
   Vector3 gravity = {0, 0, -9.81};
   SolverOptions solver;
   SleepOptions sleep;
-  std::uint32_t threads = 1;
+  Threads threads = 1;
 };
 
 /// The state has all that the next steps depend on, beside bodies and options.
@@ -161,7 +161,6 @@ class Simulation {
   std::vector<BodyState> states_;
   SimulationParts parts_;
   SimulationOptions options_;
-  Threads threads_;
   std::vector<Joint> joints_;
   std::vector<ObjectPair> joined_;  // the bodies of each
   std::vector<JointMemory> joint_memory_;

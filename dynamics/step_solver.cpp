@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 
 #include "dynamics/elimination_order.h"
 #include "dynamics/island_problem.h"
@@ -62,7 +63,13 @@ class IslandSolver final : public StepSolver {
     const std::vector<std::uint32_t> layers = find_layers(input.bodies, input.contacts, joined);
     const StepStart start = {states, impulses};
     std::vector<std::optional<Residual>> by_newton(input.islands.size());
-    input.threads.for_each(input.islands.size(), [&](std::size_t i) {
+    // Threads begin with the islands of most contacts, so that none of these is left when all others are
+    // done.
+    std::vector<std::uint32_t> order = all_below(input.islands.size());
+    std::ranges::stable_sort(order, std::greater{},
+                             [&](std::uint32_t i) { return input.islands.contacts_of(i).size(); });
+    input.threads.for_each(order.size(), [&](std::size_t place) {
+      const std::uint32_t i = order[place];
       if (input.islands.flies(i)) {
         for (const std::uint32_t body : input.islands.bodies_of(i))
           fly(input.bodies[body], input.pulls[body], input.dt, states[body]);

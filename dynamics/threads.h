@@ -1,18 +1,20 @@
 #pragma once
 #include <exception>
+#include <memory>
 #include <mutex>
 #include <new>
 
 #include "kernels/common/worker_threads.h"
+#include "tandem/kernels/scene.h"
 
 namespace tandem::dynamics {
 
-/// The threads that a step is solved on.
+/// The threads that a step is made on. Copies are the same threads, and work for one at a time.
 class Threads {
  public:
   /// threads: at most, the caller's included. Throws std::bad_alloc where a thread cannot be started.
-  explicit Threads(std::uint32_t threads) : count_(threads) {
-    if (!workers_.provide(threads)) throw std::bad_alloc();
+  Threads(std::uint32_t threads) : workers_(std::make_shared<WorkerThreads>()), count_(threads) {
+    if (!workers_->provide(threads)) throw std::bad_alloc();
   }
 
   std::uint32_t count() const { return count_; }
@@ -28,7 +30,7 @@ class Threads {
   void for_parts(std::size_t count, std::size_t grain, const Part& part) {
     std::exception_ptr thrown;
     std::mutex mutex;
-    workers_.for_parts(count_, count, grain, [&](std::size_t begin, std::size_t end, std::uint32_t) {
+    workers_->for_parts(count_, count, grain, [&](std::size_t begin, std::size_t end, std::uint32_t) {
       try {
         for (std::size_t i = begin; i < end; ++i) part(i);
       } catch (...) {
@@ -44,13 +46,16 @@ class Threads {
   /// throw.
   template <typename Work>
   void on_each(std::uint32_t workers, const Work& work) {
-    workers_.run(
+    workers_->run(
         workers, [](void* context, std::uint32_t) { (*static_cast<const Work*>(context))(); },
         const_cast<Work*>(&work));
   }
 
+  /// Has them answer the questions about a scene, which must not outlive them. Throws QueryFailed.
+  void work_for(Scene& scene) const;
+
  private:
-  WorkerThreads workers_;
+  std::shared_ptr<WorkerThreads> workers_;
   std::uint32_t count_;
 };
 

@@ -97,10 +97,10 @@ Status World::set_bodies(std::span<const BodyDescription> bodies, const WorldOpt
     const Status filters = parts.filter_pairs(setup.joints);
     if (filters != Status::kOk) return fail(filters);
     SimulationParts of;
-    of.contacts = make_scene_contacts(parts.assets, options.threads, &parts.filter);
-    of.ahead = std::make_unique<ContactsAhead>(parts.assets, options.threads, &parts.filter);
+    of.contacts = make_scene_contacts(parts.assets, setup.options.threads, &parts.filter);
+    of.ahead = std::make_unique<ContactsAhead>(parts.assets, setup.options.threads, &parts.filter);
     if (options.continuous)
-      of.continuous = std::make_unique<ContinuousMotion>(parts.assets, options.threads, &parts.filter);
+      of.continuous = std::make_unique<ContinuousMotion>(parts.assets, setup.options.threads, &parts.filter);
     of.joints = std::move(setup.joints);
     parts.simulation = std::make_unique<Simulation>(std::move(setup.properties), std::move(setup.states),
                                                     std::move(of), setup.options);

@@ -301,18 +301,18 @@ Status ConfigurationQuery::State::walk(SceneState& scene, const ConfigurationOpt
                                        std::size_t count) {
   const std::size_t moving = options.bodies.size();
   const std::uint32_t used = scene.workers_for(count, kConfigurationsAtOnce);
-  if (!scene.threads.provide(used)) return scene.fail(Status::kCannotStartThread, 0);
+  if (!scene.threads->provide(used)) return scene.fail(Status::kCannotStartThread, 0);
   if (!workers.provide(used)) return scene.fail(Status::kOutOfMemory, 0);
   for (std::size_t i = 0; i < workers.size(); ++i) workers[i].begin(moving);
   first_refused = options.poses.size();
-  scene.threads.for_parts(used, count, kConfigurationsAtOnce,
-                          [&](std::size_t i, std::size_t end, std::uint32_t number) {
-                            Worker& worker = workers[number];
-                            for (; i < end && worker.enough_memory; ++i) {
-                              const bool in_range = pose(scene, options, i, worker);
-                              if (in_range && scene.device == nullptr) work(scene, options, i, worker);
-                            }
-                          });
+  scene.threads->for_parts(used, count, kConfigurationsAtOnce,
+                           [&](std::size_t i, std::size_t end, std::uint32_t number) {
+                             Worker& worker = workers[number];
+                             for (; i < end && worker.enough_memory; ++i) {
+                               const bool in_range = pose(scene, options, i, worker);
+                               if (in_range && scene.device == nullptr) work(scene, options, i, worker);
+                             }
+                           });
   for (std::size_t i = 0; i < workers.size(); ++i) {
     if (!workers[i].enough_memory) return scene.fail(Status::kOutOfMemory, 0);
   }

@@ -108,14 +108,14 @@ Status ContactFinder::collect(SceneState& scene, Buffer<Contact>& contacts, Cont
     chunks_[i].place = place;
     place += chunks_[i].end - chunks_[i].begin;
   }
-  scene.threads.for_parts(active_workers_, chunks_.size(), kChunksAtOnce,
-                          [&](std::size_t i, std::size_t end, std::uint32_t) {
-                            for (; i < end; ++i) {
-                              const ChunkResult& chunk = chunks_[i];
-                              const Contact* from = workers_[chunk.worker].contacts.data();
-                              std::copy(from + chunk.begin, from + chunk.end, contacts.data() + chunk.place);
-                            }
-                          });
+  scene.threads->for_parts(active_workers_, chunks_.size(), kChunksAtOnce,
+                           [&](std::size_t i, std::size_t end, std::uint32_t) {
+                             for (; i < end; ++i) {
+                               const ChunkResult& chunk = chunks_[i];
+                               const Contact* from = workers_[chunk.worker].contacts.data();
+                               std::copy(from + chunk.begin, from + chunk.end, contacts.data() + chunk.place);
+                             }
+                           });
   // Which worker takes which chunk is chance: so that no call of the same scene allocates, there is room for
   // all in each.
   for (std::uint32_t i = 0; i < active_workers_; ++i) {
@@ -137,7 +137,7 @@ Status ContactFinder::find(SceneState& scene, std::span<const PosedTree> trees,
   options_ = options;
   if (options.add_error_bounds && options.mode == QueryMode::fast) options_.mode = QueryMode::exact;
   if (!provide_workers(scene)) return scene.fail(Status::kOutOfMemory, 0);
-  if (!scene.threads.provide(active_workers_)) return scene.fail(Status::kCannotStartThread, 0);
+  if (!scene.threads->provide(active_workers_)) return scene.fail(Status::kCannotStartThread, 0);
   next_chunk_.store(0, std::memory_order_relaxed);
   const auto work = [](void* finder, std::uint32_t worker) {
     static_cast<ContactFinder*>(finder)->work<false>(worker);
@@ -145,7 +145,7 @@ Status ContactFinder::find(SceneState& scene, std::span<const PosedTree> trees,
   const auto work_without_neighbours = [](void* finder, std::uint32_t worker) {
     static_cast<ContactFinder*>(finder)->work<true>(worker);
   };
-  scene.threads.run(active_workers_, leaves_out ? +work_without_neighbours : +work, this);
+  scene.threads->run(active_workers_, leaves_out ? +work_without_neighbours : +work, this);
   return collect(scene, contacts, counters);
 }
 

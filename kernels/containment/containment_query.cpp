@@ -154,20 +154,20 @@ Status ContainmentQuery::answer(SceneState& scene, std::span<const Contact> cont
   if (status == Status::kOk) status = state.check(scene, pairs, contacts);
   if (status != Status::kOk) return status;
   const std::uint32_t workers = scene.workers_for(pairs.size(), kPairsAtOnce);
-  if (!scene.threads.provide(workers)) return scene.fail(Status::kCannotStartThread, 0);
+  if (!scene.threads->provide(workers)) return scene.fail(Status::kCannotStartThread, 0);
   if (!state.found.provide(workers)) return scene.fail(Status::kOutOfMemory, 0);
   for (std::uint32_t i = 0; i < workers; ++i) {
     state.found[i].rows.clear();
     state.found[i].enough_memory = true;
   }
-  scene.threads.for_parts(workers, pairs.size(), kPairsAtOnce,
-                          [&](std::size_t from, std::size_t to, std::uint32_t worker) {
-                            for (std::size_t i = from; i < to; ++i) {
-                              const std::uint32_t first = state.begin[i], end = state.begin[i + 1];
-                              state.find(static_cast<std::uint32_t>(i), scene, pairs[i],
-                                         contacts.subspan(first, end - first), state.found[worker]);
-                            }
-                          });
+  scene.threads->for_parts(workers, pairs.size(), kPairsAtOnce,
+                           [&](std::size_t from, std::size_t to, std::uint32_t worker) {
+                             for (std::size_t i = from; i < to; ++i) {
+                               const std::uint32_t first = state.begin[i], end = state.begin[i + 1];
+                               state.find(static_cast<std::uint32_t>(i), scene, pairs[i],
+                                          contacts.subspan(first, end - first), state.found[worker]);
+                             }
+                           });
   rows_.clear();
   counters_ = {pairs.size(), 0, 0};
   for (std::uint32_t i = 0; i < workers; ++i) {

@@ -106,7 +106,7 @@ bool DistanceQuery::State::walk_round(const NearestTask& task, std::size_t first
       phase_of(task, nearest_phase)(task, &whole.walks[first + i], 1, own);
     }
   };
-  scene->threads.for_parts(scene->workers_for(count, 1), count, 1, walk);
+  scene->threads->for_parts(scene->workers_for(count, 1), count, 1, walk);
   for (std::size_t i = 0; i < count; ++i) {
     if (!take_over(slots[i].found, state)) return false;
   }
@@ -140,14 +140,14 @@ Status DistanceQuery::State::find_all() {
   const std::uint32_t workers = scene->workers_for(pairs.size(), at_once);
   if (!slots.provide(std::max<std::size_t>(workers, kWalksInRound)))
     return scene->fail(Status::kOutOfMemory, 0);
-  if (!scene->threads.provide(most)) return scene->fail(Status::kCannotStartThread, 0);
+  if (!scene->threads->provide(most)) return scene->fail(Status::kCannotStartThread, 0);
   for (std::size_t i = 0; i < slots.size(); ++i) slots[i].reset_counters();
-  scene->threads.for_parts(workers, pairs.size(), at_once,
-                           [&](std::size_t i, std::size_t end, std::uint32_t worker) {
-                             for (; i < end; ++i) {
-                               if (!is_spread(pairs[i])) find_one(i, slots[worker]);
-                             }
-                           });
+  scene->threads->for_parts(workers, pairs.size(), at_once,
+                            [&](std::size_t i, std::size_t end, std::uint32_t worker) {
+                              for (; i < end; ++i) {
+                                if (!is_spread(pairs[i])) find_one(i, slots[worker]);
+                              }
+                            });
   for (std::size_t i = 0; i < slots.size(); ++i) {
     if (!slots[i].found.enough_memory) return scene->fail(Status::kOutOfMemory, 0);
     add_to(*counters, slots[i].found.counters);

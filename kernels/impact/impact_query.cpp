@@ -102,8 +102,8 @@ Status ImpactQuery::State::move(SceneState& scene, const ImpactOptions& options)
 
 Status ImpactQuery::State::find_pairs(SceneState& scene, Buffer<ObjectPair>& pairs) {
   const std::uint32_t wanted = scene.workers_for(boxes.size(), kSweptBoxesAtOnce);
-  if (!scene.threads.provide(wanted)) return scene.fail(Status::kCannotStartThread, 0);
-  const Status status = broad_phase.find_pairs(boxes.view(), scene.filter(), false, scene.threads, wanted);
+  if (!scene.threads->provide(wanted)) return scene.fail(Status::kCannotStartThread, 0);
+  const Status status = broad_phase.find_pairs(boxes.view(), scene.filter(), false, *scene.threads, wanted);
   if (status != Status::kOk) return scene.fail(status, 0);
   return scene.take_pairs(broad_phase.pairs(), pairs);
 }
@@ -162,11 +162,11 @@ Status ImpactQuery::answer(SceneState& scene, const std::span<const ObjectPair>*
   if (status == Status::kOk) status = state->find_contacts_at_start(scene, pairs_.view());
   if (status != Status::kOk) return status;
   const std::uint32_t workers = scene.workers_for(pairs_.size(), kMovesAtOnce);
-  if (!scene.threads.provide(workers)) return scene.fail(Status::kCannotStartThread, 0);
+  if (!scene.threads->provide(workers)) return scene.fail(Status::kCannotStartThread, 0);
   if (!state->workers.provide(workers) || !rows_.resize(pairs_.size()))
     return scene.fail(Status::kOutOfMemory, 0);
   for (std::uint32_t i = 0; i < workers; ++i) state->workers[i].counters = {};
-  scene.threads.for_parts(
+  scene.threads->for_parts(
       workers, pairs_.size(), kMovesAtOnce, [&](std::size_t i, std::size_t end, std::uint32_t worker) {
         for (; i < end; ++i)
           rows_[i] = state->impact_of(i, pairs_[i], scene, options, state->workers[worker]);

@@ -1,6 +1,7 @@
 #include "tandem/kernels/manifold_query.h"
 
 #include <algorithm>
+#include <numeric>
 
 #include "kernels/common/check_options.h"
 #include "kernels/manifold/finish.h"
@@ -19,8 +20,9 @@ using manifold::OneThread;
 using manifold::Patch;
 using manifold::Shape;
 
-// Pairs with contacts that a thread takes at a time.
-constexpr std::size_t kRowsAtOnce = 16;
+// Pairs with contacts that a thread takes at a time, where there are enough for every thread to come back
+// often.
+constexpr std::size_t kMostRowsAtOnce = 16, kPartsForEach = 32;
 
 // Pairs whose manifolds a thread keeps at a time.
 constexpr std::size_t kKeptAtOnce = 256;
@@ -74,6 +76,7 @@ struct ManifoldQuery::State : Allocated {
   Buffer<std::uint32_t> begin;  // of each pair's contacts
   Buffer<Contact> grouped;
   Buffer<Row> rows;
+  Buffer<std::uint32_t> order;  // in which rows are made
   PerWorker<ManifoldWorker> workers;
   Buffer<Manifold> manifolds_before;
   Buffer<ManifoldPoint> points_before;
@@ -87,6 +90,7 @@ struct ManifoldQuery::State : Allocated {
   Status check(SceneState& scene, std::span<const ObjectPair> pairs, std::span<const Contact> contacts) const;
   Status check_kept(SceneState& scene, const Asked& asked, bool on_device) const;
   Status group(SceneState& scene, std::size_t pairs, std::span<const Contact>& contacts);
+  bool put_in_order(bool for_threads);
   void name_pairs(const MovedQuery* moved);
   void make_patches(std::size_t from, std::size_t to, std::uint32_t worker, const SceneState& scene,
                     std::span<const ObjectPair> pairs, std::span<const Contact> contacts,
@@ -169,6 +173,19 @@ Status ManifoldQuery::State::group(SceneState& scene, std::size_t pairs, std::sp
   return Status::kOk;
 }
 
+// Threads begin with the pairs of most contacts, so that none of these is left when all others are done.
+bool ManifoldQuery::State::put_in_order(bool for_threads) {
+  if (!order.resize(rows.size())) return false;
+  std::iota(order.data(), order.data() + order.size(), 0u);
+  if (!for_threads) return true;
+  const auto contacts = [&](std::uint32_t row) {
+    return begin[rows[row].asked + 1] - begin[rows[row].asked];
+  };
+  std::sort(order.data(), order.data() + order.size(),
+            [&](std::uint32_t x, std::uint32_t y) { return contacts(x) > contacts(y); });
+  return true;
+}
+
 // Says which of all pairs those are that have contacts.
 void ManifoldQuery::State::name_pairs(const MovedQuery* moved) {
   if (moved == nullptr) return;
@@ -192,7 +209,7 @@ void ManifoldQuery::State::make_patches(std::size_t from, std::size_t to, std::u
   const OneThread team;
 #endif
   for (std::size_t i = from; i < to && own.enough_memory; ++i) {
-    Row& row = rows[i];
+    Row& row = rows[order[i]];
     const ObjectPair& pair = pairs[row.pair];
     row.worker = worker;
     row.first_patch = patches.size();
@@ -331,17 +348,20 @@ Status ManifoldQuery::answer(SceneState& scene, State& state, const Asked& asked
   if (status != Status::kOk) return status;
   state.name_pairs(moved);
   const manifold::PatchOptions of_patches = {static_cast<int>(options.most_points), options.quick_depths};
-  const std::uint32_t workers = scene.workers_for(state.rows.size(), kRowsAtOnce);
-  if (!scene.threads.provide(workers)) return scene.fail(Status::kCannotStartThread, 0);
-  if (!state.workers.provide(workers)) return scene.fail(Status::kOutOfMemory, 0);
+  const std::size_t at_once =
+      std::clamp(state.rows.size() / (kPartsForEach * scene.most_workers), std::size_t{1}, kMostRowsAtOnce);
+  const std::uint32_t workers = scene.workers_for(state.rows.size(), at_once);
+  if (!scene.threads->provide(workers)) return scene.fail(Status::kCannotStartThread, 0);
+  if (!state.workers.provide(workers) || !state.put_in_order(workers > 1))
+    return scene.fail(Status::kOutOfMemory, 0);
   for (std::uint32_t i = 0; i < workers; ++i) {
     state.workers[i].made.clear();
     state.workers[i].enough_memory = true;
   }
-  scene.threads.for_parts(workers, state.rows.size(), kRowsAtOnce,
-                          [&](std::size_t from, std::size_t to, std::uint32_t worker) {
-                            state.make_patches(from, to, worker, scene, pairs, contacts, of_patches);
-                          });
+  scene.threads->for_parts(workers, state.rows.size(), at_once,
+                           [&](std::size_t from, std::size_t to, std::uint32_t worker) {
+                             state.make_patches(from, to, worker, scene, pairs, contacts, of_patches);
+                           });
   counters_ = {};
   for (std::uint32_t i = 0; i < workers; ++i) {
     if (!state.workers[i].enough_memory) return scene.fail(Status::kOutOfMemory, 0);
@@ -349,8 +369,8 @@ Status ManifoldQuery::answer(SceneState& scene, State& state, const Asked& asked
   }
   const State::Rows out = {rows_, points_};
   if ((status = state.place_pairs(scene, pairs.size(), moved, out)) != Status::kOk) return status;
-  scene.threads.for_parts(
-      workers, state.rows.size(), kRowsAtOnce, [&](std::size_t from, std::size_t to, std::uint32_t) {
+  scene.threads->for_parts(
+      workers, state.rows.size(), kMostRowsAtOnce, [&](std::size_t from, std::size_t to, std::uint32_t) {
         for (std::size_t i = from; i < to; ++i) {
           const Row& row = state.rows[i];
           state.finish(row, scene, pairs[row.pair], moved != nullptr, out, options.match_previous);
@@ -358,8 +378,8 @@ Status ManifoldQuery::answer(SceneState& scene, State& state, const Asked& asked
       });
   if (moved != nullptr) {
     const std::uint32_t of_pairs = scene.workers_for(pairs.size(), kKeptAtOnce);
-    if (!scene.threads.provide(of_pairs)) return scene.fail(Status::kCannotStartThread, 0);
-    scene.threads.for_parts(
+    if (!scene.threads->provide(of_pairs)) return scene.fail(Status::kCannotStartThread, 0);
+    scene.threads->for_parts(
         of_pairs, pairs.size(), kKeptAtOnce, [&](std::size_t from, std::size_t to, std::uint32_t) {
           for (std::size_t i = from; i < to; ++i) {
             if (moved->kept_rows()[i] != kNoIndex)

@@ -249,7 +249,7 @@ Status ClosestQuery::answer(SceneState& scene, const ClosestOptions& options) {
   if (status == Status::kOk && options.sides) status = state.label(scene);
   if (status != Status::kOk) return status;
   const std::uint32_t workers = scene.workers_for(count, kProbesAtOnce);
-  if (!scene.threads.provide(workers)) return scene.fail(Status::kCannotStartThread, 0);
+  if (!scene.threads->provide(workers)) return scene.fail(Status::kCannotStartThread, 0);
   const auto place = [&](std::uint32_t i, double* out) {
     std::copy_n(options.points[i].data(), 3, out);
     return true;
@@ -272,7 +272,7 @@ Status ClosestQuery::answer(SceneState& scene, const ClosestOptions& options) {
       }
     }
   };
-  scene.threads.for_parts(workers, count, kProbesAtOnce, find);
+  scene.threads->for_parts(workers, count, kProbesAtOnce, find);
   counters_ = {count, 0, 0};
   for (std::uint32_t i = 0; i < workers; ++i) {
     counters_.blocks += state.searches[i].blocks;

@@ -413,7 +413,7 @@ Status RayQuery::answer(SceneState& scene, const RayOptions& options) {
   State& state = *provided;
   if (const Status status = state.bodies.make(scene); status != Status::kOk) return status;
   const std::uint32_t workers = scene.workers_for(count, kProbesAtOnce);
-  if (!scene.threads.provide(workers)) return scene.fail(Status::kCannotStartThread, 0);
+  if (!scene.threads->provide(workers)) return scene.fail(Status::kCannotStartThread, 0);
   if (!state.workers.provide(workers) || !rows_.resize(all ? 0 : count) ||
       !state.begin.resize(all ? count + 1 : 0))
     return scene.fail(Status::kOutOfMemory, 0);
@@ -427,7 +427,7 @@ Status RayQuery::answer(SceneState& scene, const RayOptions& options) {
                           all ? nullptr : rows_.data(),
                           all ? state.begin.data() + 1 : nullptr};
   const std::size_t part = std::clamp(count / (4 * workers), kProbesAtOnce, kMostRaysInPart);
-  scene.threads.for_parts(workers, count, part, [&](std::size_t i, std::size_t end, std::uint32_t worker) {
+  scene.threads->for_parts(workers, count, part, [&](std::size_t i, std::size_t end, std::uint32_t worker) {
     for (; i < end && state.workers[worker].enough_memory; i += part) {
       batch.answer(static_cast<std::uint32_t>(i), static_cast<std::uint32_t>(std::min(i + part, end)),
                    state.workers[worker]);

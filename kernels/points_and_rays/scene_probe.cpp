@@ -20,7 +20,7 @@ Status ProbedBodies::make(SceneState& scene) {
     const SceneAsset& asset = scene.asset_of(i);
     frames_[i] = local_frame(scene.bodies[i].pose, scene.bodies[i].extent, asset.lower, asset.upper);
   }
-  const Status status = BroadPhase::make_tree(scene.boxes.view(), {}, scene.threads, 1, boxes_);
+  const Status status = BroadPhase::make_tree(scene.boxes.view(), {}, *scene.threads, 1, boxes_);
   if (status != Status::kOk) return scene.fail(status, 0);
   assets_id_ = scene.assets_id;
   shapes_id_ = scene.shapes_id;

@@ -130,11 +130,11 @@ Status MovedQuery::decide(SceneState& scene, State& state, const MovedOptions& o
       !posed_.resize(pairs.size()) || !rows_.resize(pairs.size()))
     return scene.fail(Status::kOutOfMemory, 0);
   const std::uint32_t workers = scene.workers_for(pairs.size(), kDecidedAtOnce);
-  if (!scene.threads.provide(workers)) return scene.fail(Status::kCannotStartThread, 0);
-  scene.threads.for_parts(workers, pairs.size(), kDecidedAtOnce,
-                          [&](std::size_t from, std::size_t to, std::uint32_t) {
-                            state.decide(from, to, scene, pairs, options, kept_rows_.data(), posed_.data());
-                          });
+  if (!scene.threads->provide(workers)) return scene.fail(Status::kCannotStartThread, 0);
+  scene.threads->for_parts(workers, pairs.size(), kDecidedAtOnce,
+                           [&](std::size_t from, std::size_t to, std::uint32_t) {
+                             state.decide(from, to, scene, pairs, options, kept_rows_.data(), posed_.data());
+                           });
   std::size_t moved = 0;
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     rows_[moved] = pairs[i];

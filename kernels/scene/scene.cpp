@@ -78,7 +78,7 @@ void SceneState::note_change(std::uint32_t body) {
 // Every part ends with its own first instance that is refused; the first of these is to blame.
 Status SceneState::pose_all(std::span<const Instance> placed, bool some_stand) {
   const std::uint32_t workers = workers_for(placed.size(), kBodiesAtOnce);
-  if (!threads.provide(workers)) return fail(Status::kCannotStartThread, 0);
+  if (!threads->provide(workers)) return fail(Status::kCannotStartThread, 0);
   std::atomic<std::size_t> first_refused = placed.size(), changes = 0;
   const auto pose_part = [&](std::size_t i, std::size_t end, std::uint32_t) {
     std::size_t changed_here = 0;
@@ -93,7 +93,7 @@ Status SceneState::pose_all(std::span<const Instance> placed, bool some_stand) {
     while (i < end && i < first && !first_refused.compare_exchange_weak(first, i)) {
     }
   };
-  threads.for_parts(workers, placed.size(), kBodiesAtOnce, pose_part);
+  threads->for_parts(workers, placed.size(), kBodiesAtOnce, pose_part);
   changed_count_ += changes;
   const std::size_t refused = first_refused;
   if (refused == placed.size()) return Status::kOk;

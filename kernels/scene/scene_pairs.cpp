@@ -119,9 +119,9 @@ Status SceneState::keep_fixed_bodies() {
   if (!any_fixed_) broad_phase_.forget_fixed();
   if (!any_fixed_ || fixed_kept_) return Status::kOk;
   const std::uint32_t workers = workers_for(boxes.size(), kBodiesAtOnce);
-  if (!threads.provide(workers)) return Status::kCannotStartThread;
+  if (!threads->provide(workers)) return Status::kCannotStartThread;
   const Status status =
-      broad_phase_.keep_fixed(boxes.view(), motion.view(), filter().world, threads, workers);
+      broad_phase_.keep_fixed(boxes.view(), motion.view(), filter().world, *threads, workers);
   fixed_kept_ = status == Status::kOk;
   return status;
 }
@@ -148,7 +148,7 @@ bool SceneState::near_pairs_hold(std::uint32_t workers) {
   PairFilter all = filter();
   all.excluded = {};
   const bool found = near_.widen(asked_boxes(), [&](std::uint32_t i) { return is_fixed(i); }) &&
-                     broad_phase_.find_pairs(near_.boxes(), all, false, threads, workers) == Status::kOk &&
+                     broad_phase_.find_pairs(near_.boxes(), all, false, *threads, workers) == Status::kOk &&
                      near_.take(broad_phase_.pairs());
   if (!found) near_.forget();
   return found;
@@ -161,9 +161,9 @@ Status SceneState::take_near_pairs() {
   const std::size_t parts = (near.size() + kNearAtOnce - 1) / kNearAtOnce;
   const std::uint32_t workers = workers_for(parts, 1);
   if (!found_.resize(near.size()) || !meeting_.resize(parts)) return Status::kOutOfMemory;
-  if (!threads.provide(workers)) return Status::kCannotStartThread;
+  if (!threads->provide(workers)) return Status::kCannotStartThread;
   ObjectPair* const found = found_.data();
-  threads.for_parts(workers, parts, 1, [&](std::size_t part, std::size_t last, std::uint32_t) {
+  threads->for_parts(workers, parts, 1, [&](std::size_t part, std::size_t last, std::uint32_t) {
     for (; part < last; ++part) {
       const std::size_t begin = part * kNearAtOnce, end = std::min(begin + kNearAtOnce, near.size());
       std::size_t next = begin;
@@ -190,10 +190,10 @@ Status SceneState::search_all() {
   if (const Status status = keep_fixed_bodies(); status != Status::kOk) return status;
   if (!widen_boxes()) return Status::kOutOfMemory;
   const std::uint32_t workers = workers_for(broad_phase_.free_count(boxes.size()), kBodiesAtOnce);
-  if (!threads.provide(workers)) return Status::kCannotStartThread;
+  if (!threads->provide(workers)) return Status::kCannotStartThread;
   if (near_pairs_hold(workers)) return take_near_pairs();
   const Status status =
-      broad_phase_.find_pairs(asked_boxes(), filter(), found_of_.self_pairs, threads, workers);
+      broad_phase_.find_pairs(asked_boxes(), filter(), found_of_.self_pairs, *threads, workers);
   if (status != Status::kOk) return status;
   const std::span<const ObjectPair> all = broad_phase_.pairs();
   if (!found_.resize(all.size())) return Status::kOutOfMemory;
@@ -222,8 +222,8 @@ Status SceneState::follow_changed() {
   if (searched_alone_ < kSearchesForTree) return Status::kOk;
   searched_alone_ = 0;
   const std::uint32_t workers = workers_for(boxes.size(), kBodiesAtOnce);
-  if (!threads.provide(workers)) return Status::kCannotStartThread;
-  return tree_.make(asked_boxes(), filter(), threads, workers);
+  if (!threads->provide(workers)) return Status::kCannotStartThread;
+  return tree_.make(asked_boxes(), filter(), *threads, workers);
 }
 
 // Visits all bodies whose boxes meet that of one, and maybe others.

@@ -88,7 +88,8 @@ struct SceneState : Allocated {
   FilterColumns columns;
   ExcludedPairs excluded;
 
-  WorkerThreads threads;
+  WorkerThreads own_threads;
+  WorkerThreads* threads = &own_threads;  // those that work: its own, or threads that others use too
   std::uint32_t most_workers = 1;
   std::uint64_t where = 0;
   Buffer<ObjectPair> pairs;  // of Scene::find_pairs()

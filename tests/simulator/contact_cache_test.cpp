@@ -18,6 +18,7 @@ struct BoxOnSlab {
   std::vector<BodyState> states = std::vector<BodyState>(2);
   ContactPoint contact = {0, 1, {0.25, 0, 0.5}, kUp, 0.002, 7};
   ContactCache cache;
+  Threads threads = 3;
   PairJudge judge;
 
   BoxOnSlab() { states[1].position.z = 0.998; }
@@ -36,7 +37,8 @@ struct BoxOnSlab {
     }
     const double g = 9.81, dt = std::sqrt(kGap / (2 * g));
     const std::vector<Pull> pulls(bodies.size(), {{0, 0, -g}, {}});
-    cache.update(found, judge.kept(pairs, poses, radii, kReach), {bodies, states, idle, dt, pulls, kReach});
+    cache.update(found, judge.kept(pairs, poses, radii, kReach), {bodies, states, idle, dt, pulls, kReach},
+                 threads);
     return {cache.contacts().begin(), cache.contacts().end()};
   }
 

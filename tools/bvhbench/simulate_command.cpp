@@ -246,8 +246,8 @@ std::unique_ptr<BodyMover> make_mover(const SimulateArguments& arguments, const 
   // World does the same.
   const bool is_world = arguments.engine == "tandem" && !arguments.fast && !arguments.ask_all;
   auto contacts = is_world ? make_scene_contacts(start.shapes(), options.threads, &start.filter)
-                           : make_mesh_contact_finder(std::move(engine), start.shapes(), options.threads,
-                                                      arguments.ask_all);
+                           : make_mesh_contact_finder(std::move(engine), start.shapes(),
+                                                      options.threads.count(), arguments.ask_all);
   return std::make_unique<MovesBy<Simulator>>(bodies, states, std::move(contacts), options,
                                               std::move(continuous), std::move(ahead));
 }

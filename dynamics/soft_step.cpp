@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "dynamics/contact_work.h"
 #include "dynamics/phases.h"
 #include "kernels/common/lane_variant.h"
 
@@ -271,7 +270,11 @@ void SoftSolver::work_on_joints(Work work, double time) {
 // kinematic bodies that touch others, may.
 void SoftSolver::limit_work(const Step& step, std::span<const std::uint32_t> islands) {
   const StepInput& input = step.input;
-  part_.assign(body_.size(), 1);
+  part_.assign(body_.size(), 1), work_.resize(body_.size());
+  input.threads.for_parts(body_.size() - 1, kBodiesAtOnce, [&](std::size_t before) {
+    const std::size_t i = before + 1;
+    work_[i] = work_on_body(bodies_[i], velocities_[i], input.dt);
+  });
   const auto is_kinematic = [&](std::uint32_t body) {
     return input.bodies[body].motion == Motion::kinematic;
   };
@@ -281,14 +284,10 @@ void SoftSolver::limit_work(const Step& step, std::span<const std::uint32_t> isl
     for (const std::uint32_t i : input.islands.contacts_of(island)) {
       if (is_kinematic(input.contacts[i].body_a) || is_kinematic(input.contacts[i].body_b)) work.note_drive();
     }
-    const auto visit = [&](void (ContactWork::*add)(const WorkOnBody&)) {
-      for (const std::uint32_t body : input.islands.bodies_of(island)) {
-        const std::uint32_t i = place_[body];
-        (work.*add)(work_on_body(bodies_[i], velocities_[i], input.dt));
-      }
-    };
-    visit(&ContactWork::note), visit(&ContactWork::add);
-    for (const std::uint32_t body : input.islands.bodies_of(island)) part_[place_[body]] = work.part();
+    const auto bodies = input.islands.bodies_of(island);
+    for (const std::uint32_t body : bodies) work.note(work_[place_[body]]);
+    for (const std::uint32_t body : bodies) work.add(work_[place_[body]]);
+    for (const std::uint32_t body : bodies) part_[place_[body]] = work.part();
   }
 }
 

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "dynamics/contact_rows.h"
+#include "dynamics/contact_work.h"
 #include "dynamics/pair_colours.h"
 #include "dynamics/soft_joints.h"
 #include "dynamics/soft_rows.h"
@@ -88,7 +89,8 @@ class SoftSolver {
   std::vector<SoftGap> gaps_;
   std::vector<SoftFriction> frictions_;
   std::vector<SoftMotion> velocities_, moved_;  // what the step adds to the motion of its start
-  std::vector<double> part_;                    // of their impulses, of each body
+  std::vector<WorkOnBody> work_;
+  std::vector<double> part_;               // of their impulses, of each body
   std::vector<SoftMotion> gains_, start_;  // what a substep adds to each; the velocities without its contacts
 };
 

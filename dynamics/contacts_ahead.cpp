@@ -198,11 +198,12 @@ void ContactsAhead::find_surprised(std::span<const ContactPoint> known, const Bo
   find_ways(start.bodies, start.states, end);
   for (const Apart& apart : apart_) {
     const ObjectPair& pair = apart.pair;
-    bool touches = false;
-    for (; !known.empty() && pair_of(known.front()) <= pair; known = known.subspan(1))
-      touches = touches || (pair_of(known.front()) == pair && known.front().depth >= 0);
-    if (touches || !apart.reach.is_slow) continue;
-    if (between(pair) > std::max(0.0, apart.distance) + start.slop) pairs_.push_back(pair);
+    if (!apart.reach.is_slow || !(between(pair) > std::max(0.0, apart.distance) + start.slop)) continue;
+    const auto of_pair = std::ranges::equal_range(
+        known, pair, {}, [](const ContactPoint& contact) { return pair_of(contact); });
+    const bool touches =
+        std::ranges::any_of(of_pair, [](const ContactPoint& contact) { return contact.depth >= 0; });
+    if (!touches) pairs_.push_back(pair);
   }
 }
 

@@ -161,8 +161,8 @@ void Simulation::solve(StepRecord& record) {
 std::vector<ContactImpulse> Simulation::solve_contacts() {
   const std::span<const ContactPoint> contacts = cache_.contacts();
   islands_ = find_islands(acting_, contacts, joined_);
-  std::vector<ContactImpulse> impulses(contacts.size());
-  if (options_.solver.warm_start) impulses = cache_.impulses();
+  std::vector<ContactImpulse> impulses =
+      options_.solver.warm_start ? cache_.impulses() : std::vector<ContactImpulse>(contacts.size());
   done_.assign(contacts.size(), {});
   parts_.solver->step({{acting_, contacts, options_.dt, pulls_},
                        islands_,

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 
 #include "dynamics/linear.h"
 #include "dynamics/world_on_ground.h"
@@ -542,6 +543,25 @@ TEST(World, GoesBackToWhatWasSavedAndDoesNotDependOnThreads) {
     EXPECT_EQ(world.restore(*state), Status::kKeptMismatch);
   }
 }
+
+#ifdef __linux__
+
+// The scenes of a world and its solver work by turns, and share their threads.
+TEST(World, StartsNoMoreThreadsThanItWasTold) {
+  const auto threads = [] {
+    std::size_t count = 0;
+    for (const auto& thread : std::filesystem::directory_iterator("/proc/self/task"))
+      count += thread.exists();
+    return count;
+  };
+  const std::size_t before = threads();
+  WorldOnGround scene(tetrahedron());
+  for (int i = 0; i < 200; ++i) scene.add(shift(i % 14, i / 14 % 14, 0.4));
+  ASSERT_EQ(scene.begin({.continuous = true, .threads = 4}).step(kStep, 20), Status::kOk);
+  EXPECT_EQ(threads(), before + 3);
+}
+
+#endif
 
 }  // namespace
 // A plate that stands on the ground to the last bit, or barely above it, slides by v^2 / (2 friction g).

@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 #include "analytic_contacts.h"
+#include "dynamics/random_heap.h"
 
 namespace tandem::simulation {
 namespace {
@@ -216,6 +218,50 @@ TEST(WarmStart, ImpulsesFollowFeaturesThenPlacesAndTheRestIsSharedOut) {
   EXPECT_EQ(matched[1].normal, 1);
   EXPECT_EQ(matched[2].normal, 2);
   EXPECT_EQ(matched[3].normal, 2);
+}
+
+// What two steps make of the contacts of a heap: some pairs are kept, some are new, some lose contacts, and
+// some are idle.
+ContactCache after_two_steps(const RandomHeap& heap, Threads threads) {
+  ContactCache cache;
+  std::vector<std::uint8_t> idle(heap.bodies.size());
+  for (std::size_t i = 0; i < idle.size(); ++i) idle[i] = i % 4 == 0 ? 1 : 0;
+  const BodiesAhead of = {heap.bodies, heap.states, idle, heap.dt, heap.pulls, kReach};
+  std::vector<ContactPoint> found[2];
+  std::vector<ObjectPair> kept;
+  for (const ContactPoint& contact : heap.contacts) {
+    const std::uint32_t kind = contact.body_a % 5;
+    if (kind != 0) found[0].push_back(contact);
+    if (kind != 1 && found[1].size() % 7 != 3) found[1].push_back(contact);
+    const ObjectPair pair = pair_of(contact);
+    if (kind == 1 && (kept.empty() || kept.back() != pair)) kept.push_back(pair);
+  }
+  cache.update(found[0], {}, of, threads);
+  std::vector<ContactImpulse> impulses;
+  for (const ContactPoint& contact : cache.contacts())
+    impulses.push_back({contact.position.x, contact.normal, Vector3{}});
+  cache.remember(impulses);
+  cache.update(found[1], kept, of, threads);
+  return cache;
+}
+
+TEST(ContactCache, RemembersTheSameByAnyNumberOfThreads) {
+  const RandomHeap heap({.bodies = 400, .pairs = 1500});
+  const ContactCache alone = after_two_steps(heap, 1);
+  EXPECT_GT(alone.entries().size(), alone.contacts().size());
+  for (const std::uint32_t threads : {2u, 5u}) {
+    const ContactCache cache = after_two_steps(heap, threads);
+    const auto differ = [&](std::span<const ContactPoint> p, std::span<const ContactPoint> q) {
+      return p.size() != q.size() || std::memcmp(p.data(), q.data(), p.size_bytes()) != 0;
+    };
+    EXPECT_FALSE(differ(cache.contacts(), alone.contacts()));
+    const std::vector<ContactImpulse> is = cache.impulses(), wanted = alone.impulses();
+    ASSERT_EQ(is.size(), wanted.size());
+    EXPECT_EQ(std::memcmp(is.data(), wanted.data(), sizeof(ContactImpulse) * is.size()), 0);
+    EXPECT_TRUE(std::ranges::equal(cache.entries(), alone.entries(), [](const auto& p, const auto& q) {
+      return p.pair == q.pair && p.feature == q.feature && p.quiet_steps == q.quiet_steps;
+    }));
+  }
 }
 
 // Contacts whose depths jump by up to 0.8 mm, found anew in each step, keep a block moving at 0.04 to 0.2

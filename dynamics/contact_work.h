@@ -14,9 +14,10 @@ struct WorkOnBody {
   double along;   ///< y0.d
   double square;  ///< |d|^2 / 2
 
+  /// Returns the larger of both sizes; infinity where one is no number.
   TANDEM_HD double largest() const {
-    const double most = std::fabs(along) > square ? std::fabs(along) : square;
-    return most < INFINITY ? most : INFINITY;  // not a number neither
+    const double both = std::fabs(along) + square;
+    return both < INFINITY ? std::fmax(std::fabs(along), square) : INFINITY;
   }
 };
 
@@ -29,7 +30,7 @@ TANDEM_HD inline WorkOnBody work_on_body(const SteppedBody& body, const SoftMoti
 
 /// The same of all bodies of an island. Exact impulses of contacts add no energy. Those that a soft step ends
 /// with may, where it is far from the solution: bodies that are wedged between others got speeds of 2 m/s. So
-/// it takes only the part of them that adds none.
+/// bodies get only the part of them that adds none.
 ///
 /// First note() the work on all bodies, then add() it. The bytes do not depend on the order, since the sums
 /// are of whole numbers, multiples of 2^-38 of the largest term: up to 2^24 bodies fit.

@@ -6,7 +6,6 @@
 #include <new>
 
 #include "kernels/common/stopwatch.h"
-#include "kernels/scene/scene_state.h"
 
 namespace tandem::dynamics {
 
@@ -29,8 +28,7 @@ void take_points(const ManifoldQuery& manifolds, std::span<const ObjectPair> pai
 }
 
 void Threads::work_for(Scene& scene) const {
-  require(scene.set_threads(count_), scene);
-  scene.state()->threads = workers_.get();
+  require(share_threads(*workers_, count_, scene), scene);
 }
 
 // Remembered pairs may keep a gap, with which their boxes no longer meet.

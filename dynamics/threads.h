@@ -5,7 +5,6 @@
 #include <new>
 
 #include "kernels/common/worker_threads.h"
-#include "tandem/kernels/scene.h"
 
 namespace tandem::dynamics {
 

@@ -9,6 +9,7 @@
 #include <thread>
 
 #include "tandem/formats/allocator.h"
+#include "tandem/kernels/scene.h"
 
 namespace tandem {
 
@@ -75,5 +76,9 @@ class WorkerThreads {
   std::atomic<std::uint64_t> state_ = 0;
   bool stopping_ = false;
 };
+
+/// Has these threads, at most so many of them, answer the questions about a scene instead of its own. They
+/// must outlive it, and work for one scene at a time. Result: as of Scene::set_threads().
+Status share_threads(WorkerThreads& threads, std::uint32_t count, Scene& scene);
 
 }  // namespace tandem

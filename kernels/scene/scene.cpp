@@ -228,6 +228,12 @@ Status Scene::set_threads(std::uint32_t threads) {
   return Status::kOk;
 }
 
+Status share_threads(WorkerThreads& threads, std::uint32_t count, Scene& scene) {
+  const Status status = scene.set_threads(count);
+  if (status == Status::kOk) scene.state()->threads = &threads;
+  return status;
+}
+
 Status Scene::place(std::span<const Instance> instances, const PairFilter& filter) {
   SceneState* const s = state();
   return s != nullptr ? s->place(instances, filter) : Status::kOutOfMemory;

@@ -199,10 +199,11 @@ void ContactsAhead::find_surprised(std::span<const ContactPoint> known, const Bo
   for (const Apart& apart : apart_) {
     const ObjectPair& pair = apart.pair;
     if (!apart.reach.is_slow || !(between(pair) > std::max(0.0, apart.distance) + start.slop)) continue;
-    const auto of_pair = std::ranges::equal_range(
-        known, pair, {}, [](const ContactPoint& contact) { return pair_of(contact); });
-    const bool touches =
-        std::ranges::any_of(of_pair, [](const ContactPoint& contact) { return contact.depth >= 0; });
+    bool touches = false;
+    auto contact =
+        std::ranges::lower_bound(known, pair, {}, [](const ContactPoint& of) { return pair_of(of); });
+    for (; contact != known.end() && pair_of(*contact) == pair; ++contact)
+      touches = touches || contact->depth >= 0;
     if (!touches) pairs_.push_back(pair);
   }
 }

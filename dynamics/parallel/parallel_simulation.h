@@ -395,17 +395,17 @@ class ParallelSimulation {
     if (needed > within_) within_ = 1.5 * needed, grew = true;
     if (status == Status::kOk && read_.pairs > arrays_.most_pairs) {
       grew = true;
-      status = reserve_pairs(read_.pairs + read_.pairs / 2);
+      status = reserve_pairs(roomy(read_.pairs));
     }
     const std::uint32_t moved = std::max({read_.middle, read_.approaches, read_.surprised});
     if (status == Status::kOk && moved > arrays_.most_moved) {
       grew = true;
-      status = arrays_.reserve_moved(to_, moved + moved / 2);
+      status = arrays_.reserve_moved(to_, roomy(moved));
     }
     if (status == Status::kOk &&
         (read_.found > arrays_.most_found || read_.remembered > arrays_.most_remembered)) {
       grew = true;
-      status = reserve_contacts(read_.found + read_.found / 2, read_.remembered + read_.remembered / 2);
+      status = reserve_contacts(roomy(read_.found), roomy(read_.remembered));
     }
     if (status == Status::kOk && !grew && solver_needs_.has_room == 0) {
       grew = true;
@@ -413,8 +413,7 @@ class ParallelSimulation {
     }
     if (status == Status::kOk && !grew && has_newton() && newton_needs_.has_room == 0) {
       grew = true;
-      const std::uint32_t units = newton_needs_.units + newton_needs_.units / 2;
-      status = newton_.reserve(to_, arrays_.bodies, arrays_.most_pairs, units);
+      status = newton_.reserve(to_, arrays_.bodies, arrays_.most_pairs, roomy(newton_needs_.units));
     }
     whole = !grew;
     if (grew) ++generation_;

@@ -60,10 +60,14 @@ inline SoftStepRoom usual_room(std::uint32_t bodies, std::uint32_t pairs, std::u
   return {bodies, pairs, groups, contacts / (kSoftWidth / 2) + 4 * groups};
 }
 
-/// Returns more room for a step that had too little: a quarter more than it needs.
+/// Returns the room to make where a step had too little: half as much more than it needs.
+template <typename Number>
+Number roomy(Number needed) {
+  return needed + needed / 2;
+}
 inline SoftStepRoom larger_room(const SoftStepRoom& room, const SoftStepNeeds& needs) {
   const auto larger = [](std::uint32_t has, std::uint32_t needed) {
-    return needed > has ? needed + needed / 2 : has;
+    return needed > has ? roomy(needed) : has;
   };
   return {room.bodies, larger(room.pairs, needs.pairs), larger(room.groups, needs.groups),
           larger(room.rows, needs.rows)};

@@ -28,9 +28,9 @@ TANDEM_HD inline WorkOnBody work_on_body(const SteppedBody& body, const SoftMoti
   return {dot(free, by_contacts), 0.5 * dot(by_contacts, by_contacts)};
 }
 
-/// The same of all bodies of an island. Exact impulses of contacts add no energy. Those that a soft step ends
-/// with may, where it is far from the solution: bodies that are wedged between others got speeds of 2 m/s. So
-/// bodies get only the part of them that adds none.
+/// The work of contacts on all bodies of an island. Exact impulses of contacts add no energy. Those that a
+/// soft step ends with may, where it is far from the solution: bodies that are wedged between others got
+/// speeds of 2 m/s. So bodies get only the part of them that adds none.
 ///
 /// First note() the work on all bodies, then add() it. The bytes do not depend on the order, since the sums
 /// are of whole numbers, multiples of 2^-38 of the largest term: up to 2^24 bodies fit.

@@ -36,6 +36,7 @@ void ContactsAhead::find_near(const BodiesAhead& of) {
   apart_.swap(now_apart_);
   threads_.for_parts(apart_.size(), kPairsAtOnce, [&](std::size_t i) {
     Apart& now = apart_[i];
+    // A distance that is not above 0 says nothing, so it need not follow the bodies.
     if (now.distance > 0) now.distance -= between(now.pair) * (1 + 1e-9);
     now.distance = std::max(now.distance, least_distance(of, now.pair));
     now.reach = reach_of(of, now.pair, now.distance);

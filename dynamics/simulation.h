@@ -44,7 +44,7 @@ struct SimulationOptions {
   Vector3 gravity = {0, 0, -9.81};
   SolverOptions solver;
   SleepOptions sleep;
-  Threads threads = 1;
+  Threads threads = 1;  ///< simulations of copied options share them, and must not make steps at once
 };
 
 /// The state has all that the next steps depend on, beside bodies and options.
